@@ -1,0 +1,198 @@
+"""Every default of the engine, in one place, with its unit and the paper's symbol.
+
+Sections are frozen dataclasses; ``Settings()`` is the documented default and is stored whole with each
+result. ``setting`` attaches unit, symbol and meaning, from which the command's help and the docs are made.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from typing import Any, Literal, get_type_hints
+
+from pipeline.errors import InputError
+
+
+def setting(default: Any, help: str, *, unit: str = "", symbol: str = "") -> Any:
+    """A dataclass field that knows its unit and the paper's symbol."""
+    return field(default=default, metadata={"help": help, "unit": unit, "symbol": symbol})
+
+
+@dataclass(frozen=True)
+class ImageSettings:
+    """Size at which images are processed."""
+
+    max_width: int = setting(640, "wider images are scaled down to this width", unit="px")
+    geometry_stride: int = setting(2, "geometry uses every n-th pixel", unit="px")
+    max_depth_m: float = setting(30.0, "farther depth is ignored", unit="m")
+
+
+@dataclass(frozen=True)
+class KeyframeSettings:
+    """Adaptive keyframe selection (paper, Sec. III-B.1)."""
+
+    select: bool = setting(True, "select keyframes by motion; off = every frame is one")
+    sensor_translation_m: float = setting(0.5, "sensor and LiDAR depth", unit="m", symbol="delta_x")
+    sensor_rotation_deg: float = setting(20.0, "sensor and LiDAR depth", unit="deg", symbol="delta_theta")
+    learned_translation_m: float = setting(1.0, "learned depth", unit="m", symbol="delta_x")
+    learned_rotation_deg: float = setting(30.0, "learned depth", unit="deg", symbol="delta_theta")
+    sparse_fraction: float = setting(
+        0.5, "an archive of which selection would keep at least this share is sparse already: keep all"
+    )
+    submap_size: int = setting(10, "keyframes in a submap", symbol="N_sub")
+
+
+@dataclass(frozen=True)
+class SurfaceSettings:
+    """Voxel maps: the scale of everything geometric follows from what a pixel covers."""
+
+    voxel_size_m: float = setting(0.0, "edge of a voxel; 0 = from the pixel footprint", unit="m")
+    footprint_factor: float = setting(1.3, "voxel edge over the footprint of one stride at the depth below")
+    depth_percentile: float = setting(80.0, "percentile of depth that sets the voxel edge", unit="%")
+    min_voxel_m: float = setting(0.016, "smallest automatic voxel", unit="m")
+    max_voxel_m: float = setting(0.15, "largest automatic voxel", unit="m")
+    min_samples: int = setting(3, "a voxel counts from this many pixels on")
+    truncation_voxels: float = setting(4.0, "truncation distance of the TSDF", unit="voxels")
+    min_incidence_cosine: float = setting(0.08, "surfaces seen flatter than this are not fused")
+
+
+@dataclass(frozen=True)
+class PerceptionSettings:
+    """Which backends see."""
+
+    features: str = setting("embedded", "feature extractor")
+    masks: str = setting("embedded", "mask generator")
+    depth: str = setting("archive", "depth source: the archive's own, or an estimator")
+
+
+@dataclass(frozen=True)
+class DescriptorSettings:
+    """The embedded 168-d descriptor: gradients and colour, no weights."""
+
+    patch_px: int = setting(16, "patch edge at processing size", unit="px")
+    colour_weight: float = setting(0.4, "share of colour in the correlation")
+    colour_sigma_lab: float = setting(20.0, "kernel width of the colour similarity", unit="Lab units")
+    lightness_weight: float = setting(0.5, "weight of L against a and b")
+    random_features: int = setting(48, "pairs of random Fourier features for colour")
+
+
+@dataclass(frozen=True)
+class DiscoverySettings:
+    """Support-aware object discovery without weights, refined by geometric change.
+
+    Filled in by pipeline.perception.embedded; distances in voxels so that one set serves every scale.
+    """
+
+    min_voxels: int = setting(25, "smaller objects are noise", unit="voxels")
+    min_views: int = setting(2, "objects must be seen in this many keyframes (1 in visits of few keyframes)")
+    support_gap_voxels: float = setting(10.0, "boards closer than this are one support", unit="voxels")
+
+
+@dataclass(frozen=True)
+class MergeSettings:
+    """Merging lifted masks into objects across keyframes (paper, Sec. III-B.2)."""
+
+    min_overlap: float = setting(0.3, "3D overlap (intersection over smaller) from which masks merge")
+    min_similarity: float = setting(0.6, "semantic similarity from which overlapping masks merge")
+    min_image_overlap: float = setting(0.5, "2D overlap from which a projected object claims a mask")
+
+
+@dataclass(frozen=True)
+class CorrespondenceSettings:
+    """Co-visible pairs and dense matches (paper, Sec. III-C.1)."""
+
+    pairs_per_keyframe: int = setting(3, "best co-visible keyframes of the other visit to compare with")
+    min_shared: float = setting(0.15, "share of pixels two keyframes must both see")
+    search_radius_patches: int = setting(
+        4, "the heatmap looks for the best match this far around the expected place", unit="patches"
+    )
+    heatmap_sigma_patches: float = setting(1.0, "smoothing of the semantic heatmap", unit="patches")
+
+
+@dataclass(frozen=True)
+class AssociationSettings:
+    """Score matrix, gates and assignment (paper, Sec. III-C.2)."""
+
+    tau_sigma: float = setting(0.3, "least match proportion of a confident pair", symbol="tau_sigma")
+    tau_s: float = setting(0.85, "least mean confidence of a confident pair", symbol="tau_s")
+
+
+@dataclass(frozen=True)
+class ChangeSettings:
+    """Labels (paper, Eq. 8) and what may overrule a bare mismatch."""
+
+    rule: Literal["evidence", "paper"] = setting(
+        "evidence", "evidence = the place itself must have changed; paper = Eq. 8 alone"
+    )
+    tau_d_m: float = setting(0.1, "objects displaced by more than this have moved", unit="m", symbol="tau_d")
+    nu_min: float = setting(0.5, "least coverage of a decision", symbol="nu_min")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All settings of a run."""
+
+    image: ImageSettings = field(default_factory=ImageSettings)
+    keyframes: KeyframeSettings = field(default_factory=KeyframeSettings)
+    surface: SurfaceSettings = field(default_factory=SurfaceSettings)
+    perception: PerceptionSettings = field(default_factory=PerceptionSettings)
+    descriptor: DescriptorSettings = field(default_factory=DescriptorSettings)
+    discovery: DiscoverySettings = field(default_factory=DiscoverySettings)
+    merge: MergeSettings = field(default_factory=MergeSettings)
+    correspondence: CorrespondenceSettings = field(default_factory=CorrespondenceSettings)
+    association: AssociationSettings = field(default_factory=AssociationSettings)
+    change: ChangeSettings = field(default_factory=ChangeSettings)
+
+    def to_dict(self) -> dict[str, dict[str, Any]]:
+        """Plain nested dictionary, as stored in ``result.json``."""
+        return dataclasses.asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, dict[str, Any]]) -> Settings:
+        """Inverse of :meth:`to_dict`; missing values keep their default.
+
+        Raises:
+            InputError: an unknown section or name, or a value of the wrong type.
+        """
+        settings = cls()
+        for section, entries in values.items():
+            for name, value in entries.items():
+                settings = settings.override(f"{section}.{name}", value)
+        return settings
+
+    def override(self, name: str, value: Any) -> Settings:
+        """A copy with ``section.name`` replaced; text is converted to the setting's type.
+
+        Raises:
+            InputError: there is no such setting, or the value does not fit its type.
+        """
+        section_name, _, setting_name = name.partition(".")
+        section = getattr(self, section_name, None)
+        if section is None or not hasattr(section, setting_name):
+            raise InputError(f"there is no setting {name!r}", "`oasisview run --settings` lists them all")
+        wanted = get_type_hints(type(section))[setting_name]
+        converted = _convert(name, value, wanted)
+        return dataclasses.replace(
+            self, **{section_name: dataclasses.replace(section, **{setting_name: converted})}
+        )
+
+
+def _convert(name: str, value: Any, wanted: Any) -> Any:
+    choices = getattr(wanted, "__args__", None)
+    if choices:
+        if value not in choices:
+            raise InputError(f"{name} cannot be {value!r}", f"choose one of {', '.join(map(str, choices))}")
+        return value
+    if wanted is bool and isinstance(value, str):
+        if value.lower() not in ("true", "false", "on", "off", "1", "0"):
+            raise InputError(f"{name} cannot be {value!r}", "write true or false")
+        return value.lower() in ("true", "on", "1")
+    try:
+        converted = wanted(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} cannot be {value!r}", f"it is a number of type {wanted.__name__}") from None
+    if wanted is int and float(value) != converted:
+        raise InputError(f"{name} cannot be {value!r}", "it is a whole number")
+    if wanted is float and not (converted == converted and abs(converted) != float("inf")):
+        raise InputError(f"{name} cannot be {value!r}", "it is a finite number")
+    return converted
