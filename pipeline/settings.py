@@ -7,6 +7,7 @@ result. ``setting`` attaches unit, symbol and meaning, from which the command's 
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_type_hints
 
@@ -193,6 +194,6 @@ def _convert(name: str, value: Any, wanted: Any) -> Any:
         raise InputError(f"{name} cannot be {value!r}", f"it is a number of type {wanted.__name__}") from None
     if wanted is int and float(value) != converted:
         raise InputError(f"{name} cannot be {value!r}", "it is a whole number")
-    if wanted is float and not (converted == converted and abs(converted) != float("inf")):
+    if wanted is float and not math.isfinite(converted):
         raise InputError(f"{name} cannot be {value!r}", "it is a finite number")
     return converted
