@@ -20,6 +20,17 @@ def setting(default: Any, help: str, *, unit: str = "", symbol: str = "") -> Any
 
 
 @dataclass(frozen=True)
+class ArchiveSettings:
+    """What is accepted as an archive."""
+
+    max_unpacked_bytes: int = setting(64 * 10**9, "larger zip and tar archives are refused", unit="B")
+    max_members: int = setting(1_000_000, "zip and tar archives of more files are refused")
+    max_ratio: float = setting(200.0, "packed archives that grow by more than this are refused")
+    ratio_from_bytes: int = setting(10**9, "smaller unpacked sizes may have any ratio", unit="B")
+    max_time_gap_s: float = setting(0.02, "images and poses farther apart are not associated", unit="s")
+
+
+@dataclass(frozen=True)
 class ImageSettings:
     """Size at which images are processed."""
 
@@ -81,12 +92,32 @@ class DescriptorSettings:
 class DiscoverySettings:
     """Support-aware object discovery without weights, refined by geometric change.
 
-    Filled in by pipeline.perception.embedded; distances in voxels so that one set serves every scale.
+    Distances are in voxels wherever they follow from the resolution, so that one set serves every scale.
     """
 
     min_voxels: int = setting(25, "smaller objects are noise", unit="voxels")
     min_views: int = setting(2, "objects must be seen in this many keyframes (1 in visits of few keyframes)")
+    seed: int = setting(0, "seed of the random draws; the same seed gives the same objects")
+    structure_rounds: int = setting(14, "planes tried as walls, floors and ceilings")
+    structure_hypotheses: int = setting(150, "random planes per round")
+    wall_area_m2: float = setting(2.0, "least area of a wall at 2 cm voxels; grows with the voxel", unit="m2")
+    level_area_m2: float = setting(1.0, "least area of a floor at 2 cm voxels; grows with the voxel", unit="m2")
+    wall_hidden: float = setting(0.05, "a wall has less than this share of voxels behind it")
+    level_hidden: float = setting(0.02, "a floor or ceiling has less than this share of voxels behind it")
+    raised_border: float = setting(0.3, "a floor drops off along less than this share of its border")
+    floor_band_voxels: float = setting(1.5, "what lies this close to the floor is floor", unit="voxels")
+    support_up_cosine: float = setting(0.7, "supports face up at least this much")
     support_gap_voxels: float = setting(10.0, "boards closer than this are one support", unit="voxels")
+    support_area_m2: float = setting(0.25, "least area of a support", unit="m2")
+    support_area_voxels: float = setting(250.0, "least area of a support", unit="voxels^2")
+    support_band_voxels: float = setting(1.3, "half the thickness of a support's layer", unit="voxels")
+    contact_voxels: float = setting(2.6, "closer than this, a piece touches a support", unit="voxels")
+    item_footprint: float = setting(0.35, "an item covers less than this share of its support")
+    item_below: float = setting(0.1, "an item has less than this share of voxels below its support's plane")
+    post_reach_m: float = setting(0.15, "a post joins the boards this far beyond its ends", unit="m")
+    attach_voxels: float = setting(3.0, "floating pieces join the neighbour within this reach", unit="voxels")
+    whole_change: float = setting(0.5, "a segment changed by more than this share changed as a whole")
+    change_region_voxels: int = setting(30, "changed regions from this size on become objects", unit="voxels")
 
 
 @dataclass(frozen=True)
@@ -133,6 +164,7 @@ class ChangeSettings:
 class Settings:
     """All settings of a run."""
 
+    archive: ArchiveSettings = field(default_factory=ArchiveSettings)
     image: ImageSettings = field(default_factory=ImageSettings)
     keyframes: KeyframeSettings = field(default_factory=KeyframeSettings)
     surface: SurfaceSettings = field(default_factory=SurfaceSettings)

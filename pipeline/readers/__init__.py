@@ -1,0 +1,55 @@
+"""Archives become sessions: one file per format, found by what the archive holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.errors import InputError
+from pipeline.readers.filetree import DirectoryTree, FileTree, SubTree
+from pipeline.readers.nerfstudio import NerfstudioReader
+from pipeline.readers.reader import Reader
+from pipeline.session import Session
+from pipeline.settings import ArchiveSettings
+
+READERS: tuple[Reader, ...] = (NerfstudioReader(),)
+MAX_NESTING = 3  # folders around the recording: many tools pack "visit1/" instead of its content
+
+__all__ = ["READERS", "open_session"]
+
+
+def open_session(path: Path | str, settings: ArchiveSettings | None = None) -> Session:
+    """Open a recording of any known format; images stay unread until asked for.
+
+    Args:
+        path: a folder, or a ``.zip``, ``.tar`` or ``.tar.gz`` of one.
+        settings: limits on what is accepted.
+
+    Raises:
+        InputError: there is nothing there, or it cannot be used; the message says what to mend.
+    """
+    settings = settings or ArchiveSettings()
+    tree = _open_tree(Path(path), settings)
+    for reader, found in ((reader, found) for found in _candidates(tree) for reader in READERS):
+        if reader.matches(found):
+            return reader.read(found, settings)
+    wanted = "; ".join(f"{reader.looks_for} ({reader.name})" for reader in READERS)
+    raise InputError(f"{tree.path} holds no recording of a known format", f"looked for {wanted}")
+
+
+def _open_tree(path: Path, settings: ArchiveSettings) -> FileTree:
+    if path.is_dir():
+        return DirectoryTree(path)
+    if not path.exists():
+        raise InputError(f"there is no archive {path}", "name a folder, .zip, .tar or .tar.gz")
+    raise InputError(f"{path} is not an archive", "name a folder, .zip, .tar or .tar.gz")
+
+
+def _candidates(tree: FileTree) -> list[FileTree]:
+    """The archive itself, then the only folder in it, and so on."""
+    candidates = [tree]
+    for _ in range(MAX_NESTING):
+        folders = [name for name in candidates[-1].entries()[1] if not name.startswith((".", "__MACOSX"))]
+        if len(folders) != 1:
+            break
+        candidates.append(SubTree(candidates[-1], folders[0]))
+    return candidates
