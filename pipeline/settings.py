@@ -48,8 +48,8 @@ class KeyframeSettings:
     sensor_rotation_deg: float = setting(20.0, "sensor and LiDAR depth", unit="deg", symbol="delta_theta")
     learned_translation_m: float = setting(1.0, "learned depth", unit="m", symbol="delta_x")
     learned_rotation_deg: float = setting(30.0, "learned depth", unit="deg", symbol="delta_theta")
-    sparse_fraction: float = setting(
-        0.5, "an archive of which selection would keep at least this share is sparse already: keep all"
+    sparse_step: float = setting(
+        0.2, "an archive whose median step is at least this share of a threshold is sparse already: keep all"
     )
     submap_size: int = setting(10, "keyframes in a submap", symbol="N_sub")
 
@@ -130,6 +130,19 @@ class MergeSettings:
 
 
 @dataclass(frozen=True)
+class ObservationSettings:
+    """What counts as seen, seen through, and occluded."""
+
+    near_m: float = setting(0.2, "nearer voxels are not judged", unit="m")
+    tolerance_voxels: float = setting(1.6, "depth agreement, in voxels", unit="voxels")
+    tolerance_m: float = setting(0.035, "least depth agreement", unit="m")
+    tolerance_per_metre: float = setting(0.006, "growth of the agreement with depth", unit="m/m")
+    min_free: int = setting(2, "keyframes that must see through a voxel that others hit")
+    free_ratio: float = setting(0.6, "share of observations that must see through")
+    colour_min_cosine: float = setting(0.15, "colours are read off surfaces that face the camera so much")
+
+
+@dataclass(frozen=True)
 class CorrespondenceSettings:
     """Co-visible pairs and dense matches (paper, Sec. III-C.1)."""
 
@@ -172,6 +185,7 @@ class Settings:
     descriptor: DescriptorSettings = field(default_factory=DescriptorSettings)
     discovery: DiscoverySettings = field(default_factory=DiscoverySettings)
     merge: MergeSettings = field(default_factory=MergeSettings)
+    observation: ObservationSettings = field(default_factory=ObservationSettings)
     correspondence: CorrespondenceSettings = field(default_factory=CorrespondenceSettings)
     association: AssociationSettings = field(default_factory=AssociationSettings)
     change: ChangeSettings = field(default_factory=ChangeSettings)

@@ -1,0 +1,95 @@
+"""The three seams behind which perception backends stand: features, masks, depth.
+
+A backend is one new file that implements a protocol and is named in ``pipeline.perception.registry``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.mapping.surface import FusedSurface
+
+
+@dataclass(frozen=True)
+class PatchWarp:
+    """Where the patches of the current keyframe lie in the previous one, from depth and poses.
+
+    Attributes:
+        positions: (H_f, W_f, 2) column and row in the previous patch grid, fractional.
+        is_visible: (H_f, W_f) the patch has depth and the previous keyframe sees its place.
+    """
+
+    positions: NDArray[np.float32]
+    is_visible: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class SimilarityScale:
+    """How a descriptor's correlation reads: it differs between descriptors and is never transferable.
+
+    Attributes:
+        threshold: correlation at which a place is as likely changed as not.
+        softness: how fast that turns; one softness below the threshold is changed at 73 %.
+    """
+
+    threshold: float
+    softness: float
+
+
+class FeatureExtractor(Protocol):
+    """Dense features of images (paper: the encoder g)."""
+
+    name: str
+    weights_hash: str | None  # None when there are no weights
+    similarity: SimilarityScale
+
+    def describe(self, rgb: NDArray[np.uint8]) -> NDArray[np.float16]:
+        """What is stored for an image: (H_f, W_f, c) float16, row-major patches over the whole image."""
+
+    def comparable(
+        self,
+        previous: NDArray[np.float16],
+        current: NDArray[np.float16],
+        warp: PatchWarp | None,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """F0 and F1 of a pair of stored maps: (N0, d) and (N1, d) unit rows, so that C = F0 F1^T.
+
+        Args:
+            previous, current: stored maps of ``describe``.
+            warp: rough alignment of the pair, for lighting compensation; None compares as they are.
+        """
+
+
+class MaskGenerator(Protocol):
+    """Instance masks per keyframe (paper: SAM2)."""
+
+    name: str
+    weights_hash: str | None
+
+    def prepare(self, surface: FusedSurface) -> None:
+        """Called once per visit before any mask is asked for."""
+
+    def masks(self, rgb: NDArray[np.uint8], voxels: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Masks of one keyframe.
+
+        Args:
+            rgb: (H, W, 3) at processing size.
+            voxels: (h, w) number of the surface voxel of every strided pixel, -1 = none.
+
+        Returns:
+            (h, w) mask number of every strided pixel, 0 = none; numbers mean nothing across keyframes.
+        """
+
+
+class DepthEstimator(Protocol):
+    """Metric depth of images that come without it."""
+
+    name: str
+    weights_hash: str | None
+
+    def depth(self, rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """(H, W) metres."""
