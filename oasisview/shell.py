@@ -12,8 +12,8 @@ Inside it (and inside viser's ``add_html``) elements talk to the server without 
   opens the dialog. Scripts may call ``O(kind, value)`` themselves.
 
 Styles: ``web_assets/style.css`` is sent first, then every other ``web_assets/*.css`` by name. Root elements
-carry class ``oa``; labels are classes ``static appeared disappeared moved unknown replaced`` which set the
-colour ``--c``; ``<span class="gl moved">`` draws the label's glyph chip (see ``glyph``).
+carry class ``oa``; ``oa-static``, ``oa-appeared`` ... set the colour ``--c``; all colours are variables
+``--oa-...`` of style.css.
 """
 
 from __future__ import annotations
@@ -37,22 +37,6 @@ Handler = Callable[[T], Awaitable[None] | None]
 def escape(value: object) -> str:
     """Text for HTML content or a quoted attribute; everything not written by us goes through this."""
     return html.escape(str(value), quote=True)
-
-
-# What carries a label without colour (workbench study, light and dark palettes are in style.css).
-GLYPHS = {
-    "static": "=",
-    "appeared": "+",
-    "disappeared": "−",
-    "moved": "→",
-    "unknown": "?",
-    "replaced": "⇄",
-}
-
-
-def glyph(label: str) -> str:
-    """The chip of a label name, as HTML."""
-    return f'<span class="gl {escape(label)}" role="img" aria-label="{escape(label)}">{GLYPHS[label]}</span>'
 
 
 class Shell:
