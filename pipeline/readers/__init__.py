@@ -7,11 +7,15 @@ from pathlib import Path
 from pipeline.errors import InputError
 from pipeline.readers.filetree import DirectoryTree, FileTree, SubTree
 from pipeline.readers.nerfstudio import NerfstudioReader
+from pipeline.readers.packed import open_packed
 from pipeline.readers.reader import Reader
+from pipeline.readers.sevenscenes import SevenScenesReader
+from pipeline.readers.threerscan import ThreeRScanReader
+from pipeline.readers.tum import TumReader
 from pipeline.session import Session
 from pipeline.settings import ArchiveSettings
 
-READERS: tuple[Reader, ...] = (NerfstudioReader(),)
+READERS: tuple[Reader, ...] = (NerfstudioReader(), TumReader(), ThreeRScanReader(), SevenScenesReader())
 MAX_NESTING = 3  # folders around the recording: many tools pack "visit1/" instead of its content
 
 __all__ = ["READERS", "open_session"]
@@ -41,7 +45,7 @@ def _open_tree(path: Path, settings: ArchiveSettings) -> FileTree:
         return DirectoryTree(path)
     if not path.exists():
         raise InputError(f"there is no archive {path}", "name a folder, .zip, .tar or .tar.gz")
-    raise InputError(f"{path} is not an archive", "name a folder, .zip, .tar or .tar.gz")
+    return open_packed(path, settings)
 
 
 def _candidates(tree: FileTree) -> list[FileTree]:

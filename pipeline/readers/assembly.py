@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.readers.filetree import FileTree
@@ -21,6 +22,8 @@ class FrameCollector:
     frames: list[Frame] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     _left_out: dict[str, list[str]] = field(default_factory=dict)
+    _first_reason: str = ""
+    _probed: bool = False
 
     def warn(self, message: str) -> None:
         """Note a repair; ``message`` follows the name of the archive."""
@@ -30,31 +33,34 @@ class FrameCollector:
         """Note that a frame cannot be used: ``kind`` groups equal reasons, ``detail`` names the file."""
         left_out = self._left_out.setdefault(kind, [])
         left_out.append(frame_name)
+        self._first_reason = self._first_reason or f"frame {frame_name}: {detail or kind}"
         if len(left_out) <= NAMED_PER_REASON:
             self.warn(f"frame {frame_name} is left out: {detail or kind}")
 
     def session(
         self,
-        name: str,
         format: str,
         metadata: tuple[str, ...],
+        name: str = "",
         depth_source: DepthSource = "sensor",
         captured_at: str | None = None,
+        path: Path | None = None,
     ) -> Session:
-        """The finished session, after a look at its first images.
+        """The finished session, after a look at its first images; unnamed visits are called as their archive.
 
         Raises:
             InputError: fewer than two usable frames, or none of the first images can be used.
         """
-        self._probe()
+        path = path or self.tree.path
+        self.probe()
         if len(self.frames) < MIN_FRAMES:
-            raise InputError(self._too_few(), f"a session needs at least {MIN_FRAMES} frames")
+            raise self._too_few()
         for kind, names in self._left_out.items():
             if len(names) > NAMED_PER_REASON:
                 self.warn(f"{len(names) - NAMED_PER_REASON} more frames are left out: {kind}")
         return Session(
-            name=name,
-            path=self.tree.path,
+            name=name or _archive_name(path),
+            path=path,
             format=format,
             frames=tuple(self.frames),
             depth_source=depth_source,
@@ -63,23 +69,39 @@ class FrameCollector:
             warnings=tuple(self.warnings),
         )
 
-    def _probe(self) -> None:
-        """Decode the first frame, so that wrong sizes show when the archive is opened."""
-        for _ in range(PROBED_FRAMES):
-            if not self.frames:
-                return
+    def probe(self) -> Frame | None:
+        """The first frame whose images decode, so that wrong sizes show when the archive is opened.
+
+        Raises:
+            InputError: the images of the first frames are all unusable.
+        """
+        refused = 0
+        while self.frames and not self._probed:
             try:
                 self.frames[0].load_rgb()
                 self.frames[0].load_depth()
             except InputError as error:
-                refused = self.frames.pop(0)
-                last = error
-                self.leave_out(refused.name, "its images cannot be used", str(error))
+                refused += 1
+                self.leave_out(self.frames.pop(0).name, "its images cannot be used", str(error))
+                if refused == PROBED_FRAMES:
+                    raise
             else:
-                return
-        raise last
+                self._probed = True
+        return self.frames[0] if self.frames else None
 
-    def _too_few(self) -> str:
-        found = "no usable frame" if not self.frames else "only one usable frame"
-        reasons = "; ".join(f"{len(names)} x {kind}" for kind, names in self._left_out.items())
-        return f"{self.tree.path}: {found}" + (f" ({reasons})" if reasons else "")
+    def _too_few(self) -> InputError:
+        left_out = sum(len(names) for names in self._left_out.values())
+        if not self.frames:
+            return InputError(
+                f"{self.tree.path}: none of the {left_out} frames can be used", self._first_reason
+            )
+        reasons = "; ".join(f"{len(names)} left out: {kind}" for kind, names in self._left_out.items())
+        return InputError(
+            f"{self.tree.path} has only one usable frame" + (f" ({reasons})" if reasons else ""),
+            f"a session needs at least {MIN_FRAMES} frames",
+        )
+
+
+def _archive_name(path: Path) -> str:
+    name = path.resolve().name
+    return name if path.is_dir() else name.split(".")[0]

@@ -4,26 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.camera import PinholeCamera
 from pipeline.errors import InputError
 from pipeline.readers.assembly import FrameCollector
 from pipeline.readers.filetree import FileTree, normalised
-from pipeline.readers.images import read_colour, read_counts
-from pipeline.readers.intrinsics import (
-    Distortion,
-    checked_camera,
-    number,
-    undistort_colour,
-    undistort_counts,
-)
+from pipeline.readers.intrinsics import Distortion, checked_camera, number
 from pipeline.readers.poses import checked_pose, opencv_from_opengl
+from pipeline.readers.stored import StoredImages
 from pipeline.session import DepthSource, Frame, Session
 from pipeline.settings import ArchiveSettings
 
@@ -31,54 +22,6 @@ TRANSFORMS = "transforms.json"
 INTRINSIC_KEYS = ("fl_x", "fl_y", "cx", "cy", "w", "h", "k1", "k2", "k3", "p1", "p2")
 DEPTH_SOURCES: tuple[DepthSource, ...] = ("sensor", "lidar", "learned")
 UNDISTORTED_MODELS = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE")
-
-
-@dataclass(frozen=True)
-class StoredImages:
-    """The two images of a frame, as stored: distorted, depth in counts."""
-
-    tree: FileTree
-    colour: str
-    depth: str
-    camera: PinholeCamera
-    distortion: Distortion
-    metres_per_count: float
-
-    def load_rgb(self) -> NDArray[np.uint8]:
-        """(H, W, 3) uint8 RGB, undistorted."""
-        image = read_colour(self.tree, self.colour)
-        rows, columns = image.shape[:2]
-        if (columns, rows) != (self.camera.width, self.camera.height):
-            raise InputError(
-                f"image {self.tree.where(self.colour)} is {columns} x {rows}, "
-                f"but {TRANSFORMS} says {self.camera.width} x {self.camera.height}",
-                "correct w, h and the intrinsics",
-            )
-        return undistort_colour(image, self.camera, self.distortion)
-
-    def load_depth(self) -> NDArray[np.float32]:
-        """(H, W) float32 metres, undistorted; 0 = no measurement."""
-        counts = read_counts(self.tree, self.depth)
-        rows, columns = counts.shape
-        width, height = self.camera.width, self.camera.height
-        if (columns, rows) != (width, height):
-            if not same_aspect((columns, rows), (width, height)):
-                raise InputError(
-                    f"depth image {self.tree.where(self.depth)} is {columns} x {rows}, "
-                    f"but the colour image is {width} x {height}",
-                    "depth must be registered to the colour image",
-                )
-            counts = np.asarray(
-                cv2.resize(counts, (width, height), interpolation=cv2.INTER_NEAREST_EXACT), dtype=np.uint16
-            )
-        counts = undistort_counts(counts, self.camera, self.distortion)
-        return counts.astype(np.float32) * np.float32(self.metres_per_count)
-
-
-def same_aspect(size_a: tuple[int, int], size_b: tuple[int, int]) -> bool:
-    """Whether two (width, height) differ by scale only, within the rounding of one pixel."""
-    (width_a, height_a), (width_b, height_b) = size_a, size_b
-    return abs(width_a * height_b - width_b * height_a) <= max(width_a, height_a, width_b, height_b)
 
 
 class NerfstudioReader:
@@ -117,11 +60,15 @@ class NerfstudioReader:
 
         collector = FrameCollector(tree)
         about = session_block(document, collector)
+        images: dict[int, StoredImages] = {}
         for index, entry in enumerate(entries):
-            self._add(collector, index, entry, document, metres_per_count)
+            if stored := self._add(collector, index, entry, document, metres_per_count):
+                images[index] = stored
+        if first := collector.probe():
+            warn_about_resized_depth(images[first.index], collector)
         metadata = (TRANSFORMS, *point_cloud(document, collector))
         return collector.session(
-            name=str(about.get("name") or tree.path.name.split(".")[0]),
+            name=str(about.get("name", "")),
             format=self.name,
             metadata=metadata,
             depth_source=about.get("depth_source", "sensor"),
@@ -135,11 +82,11 @@ class NerfstudioReader:
         entry: Any,
         document: Mapping[str, Any],
         metres_per_count: float,
-    ) -> None:
+    ) -> StoredImages | None:
         tree = collector.tree
         if not isinstance(entry, dict) or not isinstance(entry.get("file_path"), str):
             collector.leave_out(f"#{index}", "'file_path' is missing")
-            return
+            return None
         name = entry["file_path"]
         colour = normalised(name)
         depth_path = entry.get("depth_file_path")
@@ -149,14 +96,14 @@ class NerfstudioReader:
             collector.leave_out(
                 name, "its files lie outside the archive", f"{outside} lies outside the archive"
             )
-            return
+            return None
         if not depth:
             collector.leave_out(name, "it has no depth ('depth_file_path')")
-            return
+            return None
         for kind, file in (("colour", colour), ("depth", depth)):
             if not tree.has(file):
                 collector.leave_out(name, f"its {kind} image is missing", f"{kind} image {file} is missing")
-                return
+                return None
         overrides = any(key in entry for key in INTRINSIC_KEYS)
         where = tree.where(TRANSFORMS) + (f", frame {name}" if overrides else "")
         try:
@@ -165,12 +112,12 @@ class NerfstudioReader:
             if not overrides:
                 raise
             collector.leave_out(name, "wrong intrinsics", str(error))
-            return
+            return None
         try:
             T_world_opengl = checked_pose(entry.get("transform_matrix"))
         except InputError as error:
             collector.leave_out(name, str(error))
-            return
+            return None
         images = StoredImages(tree, colour, depth, camera, distortion, metres_per_count)
         collector.frames.append(
             Frame(
@@ -184,6 +131,7 @@ class NerfstudioReader:
                 files=tree.sources(colour, depth),
             )
         )
+        return images
 
 
 def parse_json(tree: FileTree, name: str) -> dict[str, Any]:
@@ -239,6 +187,16 @@ def session_block(document: Mapping[str, Any], collector: FrameCollector) -> dic
     if not isinstance(about.get("captured_at", ""), str):
         collector.warn(f"captured_at {about.pop('captured_at')!r} is ignored: it is not an ISO 8601 date")
     return about
+
+
+def warn_about_resized_depth(images: StoredImages, collector: FrameCollector) -> None:
+    """Tell when depth is stored smaller or larger than colour: it is read, but resolution differs."""
+    width, height = images.stored_depth_size()
+    if (width, height) != (images.camera.width, images.camera.height):
+        collector.warn(
+            f"depth images are {width} x {height} and are resized (nearest) to the colour images' "
+            f"{images.camera.width} x {images.camera.height}"
+        )
 
 
 def point_cloud(document: Mapping[str, Any], collector: FrameCollector) -> tuple[str, ...]:
