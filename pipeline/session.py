@@ -58,6 +58,7 @@ class Session:
         is_sparse: the archive holds keyframes already (readers leave this None: decided from the poses).
         metadata_files: files besides the frames' that define the session, for hashing.
         warnings: one finished line each about what was left out or repaired.
+        frames_left_out: how many frames of the archive are not in ``frames``.
     """
 
     name: str
@@ -69,3 +70,4 @@ class Session:
     is_sparse: bool | None = None
     metadata_files: tuple[Path, ...] = ()
     warnings: tuple[str, ...] = ()
+    frames_left_out: int = 0

@@ -67,6 +67,7 @@ class FrameCollector:
             captured_at=captured_at,
             metadata_files=self.tree.sources(*metadata),
             warnings=tuple(self.warnings),
+            frames_left_out=sum(len(names) for names in self._left_out.values()),
         )
 
     def probe(self) -> Frame | None:

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from pipeline.errors import InputError
 from pipeline.readers.filetree import FileTree
 
+# OpenCV would print its own lines about a broken file beside ours, which names the file.
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+
 NO_MEASUREMENT_COUNT = np.iinfo(np.uint16).max  # a saturated count: no distance, in any format
 
 

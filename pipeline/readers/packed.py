@@ -177,7 +177,7 @@ def _decompressed(path: Path, settings: ArchiveSettings) -> IO[bytes]:
                 unpacked_bytes += len(chunk)
                 _check_growth(path, unpacked_bytes, packed_bytes, settings)
                 target.write(chunk)
-        target.flush()
+        target.seek(0)
     except OSError as error:
         raise StorageError(
             f"cannot decompress {path} into {tempfile.gettempdir()}: {error.strerror}",
