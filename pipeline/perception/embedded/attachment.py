@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -22,6 +23,7 @@ from pipeline.settings import DiscoverySettings
 
 _GROUNDED_VOXELS = 3.2
 _NEIGHBOURS = 24
+_OWN_TOP = 2.0
 
 
 @dataclass(frozen=True)
@@ -78,15 +80,27 @@ class Attachment:
             above, below = contacts.above[start:end], contacts.below[start:end]
             is_under = below > np.maximum(2, 0.25 * above)
             under, over = support[is_under], support[~is_under & (above > 2)]
-            fits = np.array([self._fits(piece, int(one)) for one in over], np.bool_)
+            covered = self._covered(piece)
+            fits = np.array([self._fits(piece, covered, int(one)) for one in over], np.bool_)
+            # Its own top carries things too, but is no board that it happens to touch from below.
+            is_own_top = self._support_area[under] < _OWN_TOP * covered
             if len(over) and fits.all():
                 is_post = bool((self._footprint[piece] < 0.02 * self._support_area[over]).all())
-                barely_under = bool((below[is_under] < 0.15 * self._pieces.sizes[piece]).all())
-                if not len(under) or (barely_under and not is_post):
+                pressed = below[is_under][~is_own_top] >= 0.15 * self._pieces.sizes[piece]
+                if is_own_top.all() or not (is_post or pressed.any()):
                     self._is_item[piece] = True
+                    for one in under[is_own_top]:
+                        self._sets.join(self._pieces.count + int(one), piece)
                     continue
             for one in (*under, *over[~fits]):
                 self._sets.join(piece, self._pieces.count + int(one))
+
+    def _covered(self, piece: int) -> float:
+        """Area of a piece in plan, inside included (sides alone stand for the whole box), voxels^2."""
+        cells = np.floor(self._view.plan[self._pieces.voxels_of(np.array([piece]))])
+        hull = cv2.convexHull(cells.astype(np.float32)[:, None])
+        # Cells count whole: half a cell more on every side than between their corners.
+        return float(cv2.contourArea(hull) + 0.5 * cv2.arcLength(hull, True) + 1)
 
     def _count_contacts(self) -> _Contacts:
         in_layer = np.flatnonzero(self._layer >= 0)
@@ -107,9 +121,9 @@ class Attachment:
         below = np.bincount(inverse, ~is_above, len(key)).astype(np.int64)
         return _Contacts(key // len(self._supports), key % len(self._supports), above, below)
 
-    def _fits(self, piece: int, support: int) -> bool:
+    def _fits(self, piece: int, covered: float, support: int) -> bool:
         """Whether a piece is small for a support and does not reach below it."""
-        if self._footprint[piece] >= self._settings.item_footprint * self._support_area[support]:
+        if covered >= self._settings.item_footprint * self._support_area[support]:
             return False
         voxels = self._pieces.voxels_of(np.array([piece]))
         over = self._view.height[voxels] - self._supports[support].height_at(self._view.plan[voxels])

@@ -16,6 +16,9 @@ from pipeline.settings import DiscoverySettings
 _STEP_VOXELS = 0.9
 _BLOCK_VOXELS = 2.0
 _TRIMMED_VOXELS = 3.0
+_FACING_VOXELS = 1.5
+_SIDE_DEPTH_VOXELS = 5.5
+_SIDE_REACH_VOXELS = 2.5
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,8 @@ def find_supports(
     facing_up = ~is_structure & (
         np.asarray(surface.normals_world, np.float64) @ view.up > settings.support_up_cosine
     )
-    patches = _linked_level_patches(surface, view, facing_up, settings.support_gap_voxels)
+    upright = ~is_structure & (np.abs(np.asarray(surface.normals_world, np.float64) @ view.up) < 0.5)
+    patches = _linked_level_patches(surface, view, facing_up, upright, settings.support_gap_voxels)
     least_area = max(settings.support_area_m2 / surface.voxel_size_m**2, settings.support_area_voxels)
     supports = []
     for patch in np.flatnonzero(patches.sizes >= 0.15 * least_area):
@@ -68,12 +72,13 @@ def find_supports(
 
 
 def _linked_level_patches(
-    surface: FusedSurface, view: GravityView, facing_up: Mask, gap_voxels: float
+    surface: FusedSurface, view: GravityView, facing_up: Mask, upright: Mask, gap_voxels: float
 ) -> Pieces:
     """Voxels that face up, joined over gaps of up to ``gap_voxels`` at one height.
 
     Voxels are first joined to their neighbours; only means over blocks of 2 x 2 voxels are compared across
-    the gaps, which keeps the number of pairs near-linear.
+    the gaps, which keeps the number of pairs near-linear. Two edges with sides going down below them are the
+    tops of two bodies (cartons in a row, parked cars), not two parts of one board.
     """
     inside = np.flatnonzero(facing_up)
     place = np.full(len(facing_up), -1, np.int64)
@@ -102,10 +107,30 @@ def _linked_level_patches(
     across = (node_fragment[pairs[:, 0]] != node_fragment[pairs[:, 1]]) & (
         np.abs(mean[pairs[:, 0], 2] - mean[pairs[:, 1], 2]) < _STEP_VOXELS
     )
+    pairs = pairs[across]
+    ends = np.sort(node_fragment[pairs], axis=1)
     fragments = int(fragment.max()) + 1
-    joined = linked(fragments, node_fragment[pairs[across, 0]], node_fragment[pairs[across, 1]])
+    link, link_of = np.unique(ends[:, 0] * fragments + ends[:, 1], return_inverse=True)
+    has_side = _nodes_above_sides(mean, np.column_stack([view.plan, height])[upright])
+    distance = np.linalg.norm(mean[pairs[:, 0], :2] - mean[pairs[:, 1], :2], axis=1)
+    shortest = np.full(len(link), np.inf)
+    np.minimum.at(shortest, link_of, distance)
+    facing = distance < shortest[link_of] + _FACING_VOXELS
+    between_bodies = facing & has_side[pairs].all(axis=1)
+    open_share = np.bincount(link_of, between_bodies, len(link)) / np.bincount(link_of, facing, len(link))
+    link = link[open_share < 0.5]
+    joined = linked(fragments, link // fragments, link % fragments)
     place[inside] = joined[fragment]
     return Pieces.from_numbers(place)
+
+
+def _nodes_above_sides(nodes: Floats, sides: Floats) -> Mask:
+    """Which nodes (n, 3) have upright surface a few voxels below them; all in plan and height, voxels."""
+    if not len(sides):
+        return np.zeros(len(nodes), np.bool_)
+    below = nodes - [0.0, 0.0, _SIDE_DEPTH_VOXELS]
+    distance, _ = cKDTree(sides).query(below, distance_upper_bound=_SIDE_REACH_VOXELS)
+    return np.isfinite(distance)
 
 
 def layer_of_voxels(

@@ -27,7 +27,9 @@ def surface_from_samples(points, normals, voxel_m: float, up=(0.0, 0.0, 1.0)) ->
         return np.stack([np.bincount(voxel, values[:, i], total) for i in range(3)], 1) / counts[:, None]
 
     centres, directions = mean(points), mean(normals)
-    pairs = cKDTree(centres).query_pairs(1.9 * voxel_m, output_type="ndarray") if total else np.zeros((0, 2), int)
+    pairs = (
+        cKDTree(centres).query_pairs(1.9 * voxel_m, output_type="ndarray") if total else np.zeros((0, 2), int)
+    )
     rows, cols = np.r_[pairs[:, 0], pairs[:, 1]], np.r_[pairs[:, 1], pairs[:, 0]]
     neighbours = coo_matrix((np.ones(len(rows), np.float32), (rows, cols)), shape=(total, total)).tocsr()
     directions = directions + neighbours @ directions / np.maximum(np.diff(neighbours.indptr), 1)[:, None]
@@ -93,7 +95,8 @@ class SceneBuilder:
                 for side, face in ((low, -1.0), (high, 1.0)):
                     u, v = [a for a in range(3) if a != axis]
                     grid = np.meshgrid(
-                        np.arange(low[u] + step / 2, high[u], step), np.arange(low[v] + step / 2, high[v], step)
+                        np.arange(low[u] + step / 2, high[u], step),
+                        np.arange(low[v] + step / 2, high[v], step),
                     )
                     face_points = np.zeros((grid[0].size, 3))
                     face_points[:, u], face_points[:, v] = grid[0].ravel(), grid[1].ravel()

@@ -85,6 +85,17 @@ def test_a_large_closed_platform_is_an_object_and_not_floor(scene_builder):
     assert segments.max() == 2
 
 
+def test_a_large_carton_on_a_platform_keeps_its_own_top(scene_builder):
+    scene = scene_builder()
+    scene.room(4.5, 3.5, 2.0)
+    platform = scene.box((1.2, 1.0, 0), (3.2, 2.6, 0.3))
+    carton = scene.box((1.5, 1.3, 0.3), (2.1, 1.9, 1.0))
+    surface, owners = scene.build()
+    segments = discover_objects(surface, SETTINGS)
+    assert_found(segments, owners, [platform, carton], 0.8)
+    assert segments.max() == 2
+
+
 def test_shelf_with_boards_and_cartons(scene_builder):
     scene = scene_builder()
     scene.room(4.0, 3.0, 2.2)
@@ -180,6 +191,8 @@ def test_fragments_of_one_board_are_one_support(scene_builder):
     left = scene.box((1.0, 1.0, 0.7), (1.6, 1.6, 0.73))
     scene.box((1.75, 1.0, 0.7), (2.4, 1.6, 0.73), owner=left)
     scene.box((1.0, 1.0, 1.2), (1.7, 1.6, 1.23))
+    for x in (1.0, 1.5):  # two cartons side by side are two bodies, however close their tops are
+        scene.box((x, 2.0, 0.0), (x + 0.4, 2.4, 0.4))
     surface, owners = scene.build()
     view = GravityView.of(surface)
     structure = find_structure(surface, SETTINGS, 0).is_structure
@@ -197,7 +210,9 @@ def test_the_same_surface_gives_the_same_numbers(scene_builder):
     assert (np.diff(places) > 0).all()
 
 
-@pytest.mark.parametrize(("angle_deg", "shift"), [(0, (50.0, -20.0, 7.0)), (37, (0, 0, 0)), (141, (-3, 8, 1))])
+@pytest.mark.parametrize(
+    ("angle_deg", "shift"), [(0, (50.0, -20.0, 7.0)), (37, (0, 0, 0)), (141, (-3, 8, 1))]
+)
 def test_partition_does_not_depend_on_where_the_world_is(scene_builder, make_surface, angle_deg, shift):
     surface, _ = furnished_room(scene_builder)[0].build()
     rotation = Rotation.from_rotvec(np.deg2rad(angle_deg) * np.array([0, 0, 1.0])).as_matrix()
