@@ -31,9 +31,9 @@ def cached_result_path(previous: Path, current: Path, settings: Settings) -> Pat
     return cache_folder() / "results" / f"{_plain(previous)}-{_plain(current)}-{digest}.oasis"
 
 
-def demo_folder(scene: str, seed: int, frames: int | None) -> Path:
+def demo_folder(scene: str, seed: int, frames: int) -> Path:
     """Where ``oasisview demo`` keeps its recordings."""
-    return cache_folder() / "demo" / (f"{scene}-{seed}" + (f"-{frames}" if frames else ""))
+    return cache_folder() / "demo" / f"{scene}-{seed}-{frames}"
 
 
 def _plain(archive: Path) -> str:

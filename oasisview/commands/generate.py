@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from oasisview.commands.options import SCENES, positive
-from pipeline.errors import InputError, StorageError
+from oasisview.commands.options import SCENE_FRAMES, SCENES
+from oasisview.console import ConsoleProgress
 
 NAME = "generate"
 HELP = "a synthetic pair of recordings with exact ground truth"
@@ -19,23 +19,21 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", metavar="SCENE", choices=SCENES, help=" or ".join(SCENES))
     parser.add_argument("out", metavar="OUT", type=Path, help="folder to write, new or empty")
     parser.add_argument("--seed", type=int, required=True, metavar="N", help="which of the scenes")
-    parser.add_argument("--frames", type=positive, metavar="N", help="frames of each visit")
+    parser.add_argument(
+        "--frames",
+        type=int,
+        default=SCENE_FRAMES,
+        metavar="N",
+        help=f"of each visit (default: {SCENE_FRAMES})",
+    )
 
 
 def run_command(arguments: argparse.Namespace) -> int:
     """Generate and name what was written."""
-    out: Path = arguments.out
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(f"{out} exists and is not an empty folder", "choose another folder")
     from pipeline.synthetic import generate
 
-    try:
-        frames = {} if arguments.frames is None else {"frames": arguments.frames}
-        generate(arguments.scene, out, seed=arguments.seed, **frames)
-    except OSError as error:
-        raise StorageError(
-            f"cannot write {out}: {error.strerror}", "free some space or choose another folder"
-        ) from error
+    with ConsoleProgress() as report:
+        generate(arguments.scene, arguments.out, arguments.seed, arguments.frames, report)
     for name in ("s0", "s1", "gt.ply"):
-        print(out / name)
+        print(arguments.out / name)
     return 0

@@ -10,6 +10,8 @@ from oasisview.commands.backends import require_backend
 from pipeline.errors import InputError
 from pipeline.settings import Settings
 
+# As in pipeline.synthetic, which is heavy to import; a test holds the two together.
+SCENE_FRAMES = 40
 SCENES = ("office", "carpark", "warehouse", "market")
 
 
