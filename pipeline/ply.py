@@ -102,7 +102,7 @@ def write_ply(path: Path, points: LabelledPoints) -> None:
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with unfinished.open("wb") as file:
-            file.write(_header(len(points)))
+            file.write(ply_header(len(points)))
             file.write(vertices.tobytes())
         unfinished.replace(path)
     except OSError as error:
@@ -151,7 +151,8 @@ def read_ply(path: Path) -> LabelledPoints:
     )
 
 
-def _header(count: int) -> bytes:
+def ply_header(count: int) -> bytes:
+    """Everything before the first of ``count`` records of ``VERTEX_DTYPE``, for writing them in chunks."""
     lines = ["ply", "format binary_little_endian 1.0", f"element vertex {count}"]
     for name in VERTEX_DTYPE.names or ():
         code = VERTEX_DTYPE[name].str[1:]
