@@ -1,0 +1,41 @@
+"""The export formats by name, and the one call that writes any of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from oasisview.export.exporter import Exporter, ReviewedResult
+from oasisview.export.heatmaps import HeatmapExporter
+from oasisview.export.ply_points import PlyExporter
+from oasisview.export.tables import CsvExporter, JsonExporter
+from pipeline.errors import InputError
+from pipeline.store import open_result
+
+FORMATS: dict[str, Exporter] = {
+    exporter.name: exporter for exporter in (PlyExporter(), CsvExporter(), JsonExporter(), HeatmapExporter())
+}
+
+
+def export(result_path: str | Path, format: str, out_path: str | Path) -> None:
+    """Write a result with inspectors' decisions applied.
+
+    Args:
+        result_path: the result folder.
+        format: a name in ``FORMATS``.
+        out_path: file or (``heatmaps``) folder; an earlier export there is replaced in one step.
+
+    Raises:
+        InputError: unknown format, or ``out_path`` must not be replaced.
+        ResultError: the result or its journal cannot be read.
+        StorageError: writing failed; nothing half-written is left, an earlier export stays.
+    """
+    exporter = FORMATS.get(format)
+    if exporter is None:
+        raise InputError(f"there is no export format {format!r}", f"choose one of {', '.join(FORMATS)}")
+    result = open_result(Path(result_path))
+    out = Path(out_path)
+    if exporter.suffix and out.is_dir():
+        raise InputError(f"{out} is a folder", f"name a file, such as {out / ('map' + exporter.suffix)}")
+    if out.resolve().is_relative_to(Path(result_path).resolve()):
+        raise InputError(f"{out} is inside the result", "export to a place outside the result folder")
+    exporter.write(ReviewedResult.of(result), out)
