@@ -1,0 +1,50 @@
+# `make demo` and `make test` do everything on a fresh machine; a second call goes straight to work.
+#
+#   PYTHON     interpreter for the virtual environment, 3.11 or newer
+#   PIP_ARGS   for pip install, e.g. --extra-index-url https://download.pytorch.org/whl/cpu (see README)
+#   ARGS       for what the target runs, e.g. make demo ARGS="--scene market --no-open"
+
+PYTHON ?= python3
+PIP_ARGS ?=
+ARGS ?=
+VENV := .venv
+BIN := $(VENV)/bin
+
+.PHONY: demo test lint format benchmark clean help
+
+demo: $(VENV)/installed
+	$(BIN)/oasisview demo $(ARGS)
+
+test: $(VENV)/installed $(VENV)/chromium
+	$(BIN)/python -m pytest -n 2 -ra $(ARGS)
+
+lint: $(VENV)/installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(VENV)/installed
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+benchmark: $(VENV)/installed
+	$(BIN)/python -m benchmarks $(ARGS)
+
+clean:
+	rm -rf $(VENV)
+
+help:
+	@echo "make demo | test | lint | format | benchmark | clean"
+
+$(VENV)/bin/python:
+	.ci/system-packages libraries venv
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed: make PYTHON=python3.12 ...")'
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/installed: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet $(PIP_ARGS) --editable '.[dev]'
+	@touch $@
+
+$(VENV)/chromium: | $(VENV)/bin/python
+	.ci/system-packages chromium
+	@touch $@
