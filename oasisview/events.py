@@ -14,6 +14,8 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 Parser = Callable[[Any], T]
 
+MAX_TEXT_LENGTH = 500  # of what people write: notes and reasons
+
 
 def nothing(value: Any) -> None:
     """An event without a value."""
@@ -63,7 +65,7 @@ def choice(*choices: str) -> Parser[str]:
     return parse
 
 
-def text(max_length: int = 500) -> Parser[str]:
+def text(max_length: int = MAX_TEXT_LENGTH) -> Parser[str]:
     """Text of a person, without control characters except line breaks; surrounding space is cut off."""
 
     def parse(value: Any) -> str:

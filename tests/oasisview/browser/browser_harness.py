@@ -1,0 +1,123 @@
+"""A real Chromium on a real viewer: what tests need to drive it and to wait for it.
+
+Software rendering on a busy machine stalls a page for seconds: waits are long, and no test asserts a
+latency.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import viser
+import viser.transforms as vtf
+from playwright.sync_api import Browser, Page, Playwright
+
+from oasisview.access import GuardedServer
+
+T = TypeVar("T")
+
+WAIT_S = 20.0
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+# Software WebGL, said explicitly: builds differ in what they fall back to.
+CHROMIUM_FLAGS = [
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+]
+ARTIFACTS = Path(__file__).parents[2] / "artifacts"
+
+
+def launch_chromium(playwright: Playwright) -> Browser:
+    return playwright.chromium.launch(executable_path=CHROMIUM, headless=True, args=CHROMIUM_FLAGS)
+
+
+def wait_for(condition: Callable[[], T], what: str, timeout_s: float = WAIT_S) -> T:
+    """The first true value of ``condition``; fails the test after ``timeout_s``."""
+    end = time.monotonic() + timeout_s
+    while True:
+        value = condition()
+        if value:
+            return value
+        if time.monotonic() > end:
+            raise AssertionError(f"waited {timeout_s:.0f} s in vain for {what}")
+        time.sleep(0.02)
+
+
+@dataclass
+class ViewerPage:
+    """One tab that shows a viewer, and the viewer's handle of it."""
+
+    page: Page
+    client: viser.ClientHandle
+    server: GuardedServer
+
+    def wait_for(self, condition: Callable[[], T], what: str, timeout_s: float = WAIT_S) -> T:
+        """Like ``wait_for``, but lets the browser's own events through meanwhile."""
+
+        def polled() -> T:
+            self.page.evaluate("() => 0")
+            return condition()
+
+        return wait_for(polled, what, timeout_s)
+
+    def wait_js(self, expression: str, argument: Any = None, timeout_s: float = WAIT_S) -> Any:
+        """Wait until a JavaScript function of ``argument`` returns something true; returns it."""
+        return self.page.wait_for_function(expression, arg=argument, timeout=timeout_s * 1000).json_value()
+
+    def wait_node(self, name: str) -> None:
+        """Wait until a node of the scene is mounted."""
+        self.wait_js("name => !!window.__viserMutable.nodeRefFromName[name]", name)
+        self.settle()
+
+    def wait_shell(self) -> None:
+        """Wait until the page has its shell and the 3D view its place."""
+        self.wait_js("() => !!window.oasis && !!document.querySelector('[data-oa-view]')")
+
+    def settle(self, frames: int = 3) -> None:
+        """Let that many frames be drawn."""
+        self.page.evaluate(
+            "n => new Promise(done => { const step = () => n-- <= 0 ? done() : requestAnimationFrame(step);"
+            " step(); })",
+            frames,
+        )
+
+    def view_rect(self) -> tuple[float, float, float, float]:
+        """Left, top, width and height of the 3D view in pixels of the window."""
+        return tuple(
+            self.page.evaluate(
+                "() => { const r = window.__viserMutable.canvas.getBoundingClientRect();"
+                " return [r.x, r.y, r.width, r.height]; }"
+            )
+        )
+
+    def project(self, point_world: Any) -> tuple[float, float]:
+        """Window pixel of a world point, (3,) metres, for the camera as the server knows it."""
+        left, top, width, height = self.view_rect()
+        camera = self.client.camera
+        T_world_camera = vtf.SE3.from_rotation_and_translation(vtf.SO3(camera.wxyz), camera.position)
+        x, y, z = T_world_camera.inverse() @ np.asarray(point_world, dtype=np.float64)
+        assert z > 0, "the point is behind the camera"
+        scale = height / 2 / np.tan(camera.fov / 2)
+        return left + width / 2 + x / z * scale, top + height / 2 + y / z * scale
+
+    def click_world(self, point_world: Any) -> None:
+        """Click where a world point is seen; fails if something other than the 3D view is on top."""
+        x, y = self.project(point_world)
+        self.page.mouse.move(x, y)
+        self.settle()
+        top = self.page.evaluate("([x, y]) => document.elementFromPoint(x, y)?.tagName", [x, y])
+        assert top == "CANVAS", f"{top} covers the 3D view at ({x:.0f}, {y:.0f})"
+        self.page.mouse.click(x, y)
+
+    def screenshot(self, name: str) -> Path:
+        ARTIFACTS.mkdir(parents=True, exist_ok=True)
+        path = ARTIFACTS / f"{name}.png"
+        self.page.screenshot(path=path)
+        return path
