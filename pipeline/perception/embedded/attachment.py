@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -28,7 +29,7 @@ _OWN_TOP = 2.0
 
 @dataclass(frozen=True)
 class _Contacts:
-    """Pairs of a piece and a support it touches, sorted by piece, with its voxels above and below the plane."""
+    """Pairs of a piece and a support it touches, sorted by piece; its voxels above and below the plane."""
 
     piece: Indices
     support: Indices
@@ -74,7 +75,7 @@ class Attachment:
             return
         contacts = self._count_contacts()
         bounds = np.flatnonzero(np.diff(contacts.piece, prepend=-1, append=-1))
-        for start, end in zip(bounds[:-1], bounds[1:], strict=True):
+        for start, end in pairwise(bounds):
             piece = int(contacts.piece[start])
             support = contacts.support[start:end]
             above, below = contacts.above[start:end], contacts.below[start:end]

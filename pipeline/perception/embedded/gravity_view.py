@@ -101,6 +101,6 @@ class HullMask:
     def contains(self, positions: Floats) -> Mask:
         """Which of ``positions`` (n, 2) lie in the hull."""
         cells = np.floor(positions).astype(np.int64) - self.corner
-        inside = ((cells >= 0) & (cells < self.inside.shape)).all(axis=1)
+        inside: Mask = np.all((cells >= 0) & (cells < self.inside.shape), axis=1)
         inside[inside] = self.inside[cells[inside, 0], cells[inside, 1]]
         return inside

@@ -36,8 +36,8 @@ def refine_by_change(
     Returns:
         (M,) new segment numbers; existing segments keep theirs.
     """
-    segments = np.asarray(segments).astype(np.int32)
-    refined = segments.copy()
+    refined: NDArray[np.int32] = np.array(segments, np.int32)
+    segments = refined.copy()
     count = int(segments.max(initial=0)) + 1
     sizes = np.bincount(segments, minlength=count)
     is_whole = np.bincount(segments, changed, count) > whole_change * np.maximum(sizes, 1)

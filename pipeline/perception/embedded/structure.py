@@ -143,8 +143,10 @@ class _PlaneSearch:
             near = (np.abs(points @ normal - offset) < 2 * self._voxel) & (normals @ normal > 0.8)
             if near.sum() < _MIN_INLIERS:
                 break
-            centre = points[near].mean(axis=0)
-            _, vectors = np.linalg.eigh(np.cov((points[near] - centre).T))
+            chosen = points[near]
+            centre = np.ones(len(chosen)) @ chosen / len(chosen)
+            chosen -= centre
+            _, vectors = np.linalg.eigh(chosen.T @ chosen)
             fitted = vectors[:, 0] * np.sign(vectors[:, 0] @ normal)
             if fitted @ normal < 0.98:
                 break
@@ -169,9 +171,9 @@ class _PlaneSearch:
         for patch in np.flatnonzero(large & (behind < limit * patches.inliers)):
             if patch == 0:
                 continue
-            if tilt > 0 and is_level and self._is_raised(patches.mask(patch), patches, distance):
+            if tilt > 0 and is_level and self._is_raised(patches.mask(int(patch)), patches, distance):
                 continue
-            grown = patches.voxels_in_dilated(patch)
+            grown = patches.voxels_in_dilated(int(patch))
             taken = inliers & (patches.number == patch)
             taken |= grown & (distance < 1.6 * self._voxel) & (distance > -4 * self._voxel)
             kind = "wall" if not is_level else "floor" if tilt > 0 else "ceiling"
@@ -198,18 +200,22 @@ class _PlaneSearch:
         return bool(lower.sum() > self._settings.raised_border * max(1, seen.sum()))
 
     def take_rough_ground(self) -> None:
-        """Take large connected stretches that face up, are not plane, and have nothing below or beside them."""
+        """Take large connected stretches that face up, are no plane, and have nothing below or beside."""
         facing_up = ~self.is_structure & (self._normals @ self._view.up > self._settings.support_up_cosine)
         stretches = Pieces.of(facing_up, self._neighbours)
         least_voxels = 0.5 * self._level_area / self._voxel**2
+        plan = (self._view.plan[:, 0] / _CELL_VOXELS, self._view.plan[:, 1] / _CELL_VOXELS)
         for stretch in np.flatnonzero(stretches.sizes > least_voxels):
             members = stretches.voxels_of(np.array([stretch]))
-            patches = _Patches(self._view.plan / _CELL_VOXELS, members)
-            ground = patches.height_map(self._view.height, members)
-            area = (patches.raster > 0).sum() * (_CELL_VOXELS * self._voxel) ** 2
+            around = self._around(plan, members)
+            patches = _Patches(
+                np.stack([axis[around] for axis in plan], axis=1), np.searchsorted(around, members)
+            )
+            area = patches.occupied.sum() * (_CELL_VOXELS * self._voxel) ** 2
             if area < self._level_area:
                 continue
-            above = self._view.height - ground[patches.cells[:, 0], patches.cells[:, 1]]
+            ground = patches.height_map(self._view.height[members], np.searchsorted(around, members))
+            above = self._view.height[around] - ground[patches.cells[:, 0], patches.cells[:, 1]]
             hidden = np.count_nonzero((patches.number > 0) & (above < -_BEHIND_VOXELS))
             if hidden >= self._settings.level_hidden * len(members):
                 continue
@@ -217,7 +223,15 @@ class _PlaneSearch:
                 continue
             self.is_structure[members] = True
             band = np.abs(above) < self._settings.floor_band_voxels
-            self.is_structure |= band & facing_up & (patches.number > 0)
+            self.is_structure[around[band & facing_up[around] & (patches.number > 0)]] = True
+
+    @staticmethod
+    def _around(plan: tuple[Floats, Floats], members: Indices) -> Indices:
+        """Voxels, in order, in the plan's rectangle around ``members`` and three cells beyond."""
+        inside = np.ones(len(plan[0]), np.bool_)
+        for axis in plan:
+            inside &= (axis > axis[members].min() - 3) & (axis < axis[members].max() + 3)
+        return np.flatnonzero(inside)
 
 
 class _Patches:
@@ -232,10 +246,12 @@ class _Patches:
     """
 
     def __init__(self, plane_view: Floats, inliers: Indices):
-        cells = np.floor(plane_view).astype(np.int64)
-        self.cells = cells - cells.min(axis=0) + 2
-        image = np.zeros(self.cells.max(axis=0) + 3, np.uint8)
-        image[self.cells[inliers, 0], self.cells[inliers, 1]] = 1
+        # One axis at a time: numpy reduces tall, narrow arrays slowly.
+        axes = [np.floor(plane_view[:, axis]).astype(np.int64) for axis in (0, 1)]
+        axes = [cells - cells.min() + 2 for cells in axes]
+        self.cells = np.stack(axes, axis=1)
+        image = np.zeros([int(cells.max()) + 3 for cells in axes], np.uint8)
+        image[axes[0][inliers], axes[1][inliers]] = 1
         closed = cv2.morphologyEx(image, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
         count, raster = cv2.connectedComponents(closed, connectivity=8)
         self.raster = raster
@@ -257,10 +273,10 @@ class _Patches:
         return grown[self.cells[:, 0], self.cells[:, 1]]
 
     def height_map(self, height: Floats, members: Indices) -> Floats:
-        """Mean height of ``members`` per cell, carried on to the nearest cell where there are none."""
+        """Mean ``height`` of ``members`` (n,) per cell, carried on to the cells without any."""
         shape = self.raster.shape
         flat = self.cells[members, 0] * shape[1] + self.cells[members, 1]
-        total = np.bincount(flat, height[members], shape[0] * shape[1])
+        total = np.bincount(flat, height, shape[0] * shape[1])
         number = np.bincount(flat, minlength=shape[0] * shape[1])
         known = number > 0
         mean = np.where(known, total / np.maximum(number, 1), 0.0)

@@ -66,7 +66,7 @@ def find_supports(
         if area < least_area and not hidden_board:
             continue
         design = np.column_stack([plan, np.ones(len(plan))])
-        slope = np.linalg.lstsq(design, view.height[members], rcond=None)[0]
+        slope = np.asarray(np.linalg.lstsq(design, view.height[members], rcond=None)[0], np.float64)
         supports.append(Support(slope, members, hull))
     return supports
 
