@@ -1,0 +1,198 @@
+"""Draw a scene from a seed and record both visits, with the ground truth."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import shutil
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.camera import PinholeCamera, transform_points
+from pipeline.errors import InputError, StorageError
+from pipeline.ply import NOT_SCORED, LabelledPoints, write_ply
+from pipeline.progress import ProgressEvent, Report, silent
+from pipeline.result import ChangeLabel
+from pipeline.synthetic.archive import ArchiveWriter
+from pipeline.synthetic.atlas import TextureAtlas
+from pipeline.synthetic.props import Workshop
+from pipeline.synthetic.render import Renderer
+from pipeline.synthetic.sensor import expose, measure, misplace
+from pipeline.synthetic.truth import SeenPoints, TruthSettings, assemble, label_points, observed
+from pipeline.synthetic.world import SensorSettings, SyntheticScene
+
+SCENES = ("office", "carpark", "warehouse", "market")
+_FIRST_DAY = datetime(2026, 1, 5, 8, 0, tzinfo=UTC)
+_TRUTH_STRIDE = 2  # every second pixel is enough for points 2 cm apart
+_STAGE = "generate"
+
+
+def generate(
+    scene: str,
+    out: Path,
+    seed: int,
+    frames: int = 40,
+    report: Report = silent,
+    *,
+    size: tuple[int, int] = (640, 480),
+    sensor: SensorSettings | None = None,
+) -> None:
+    """Write two visits of a synthetic scene: ``OUT/s0``, ``OUT/s1``, ``OUT/gt.ply``, ``OUT/scene.json``.
+
+    The same arguments give the same bytes. ``scene.json`` is for people and tests; nothing that
+    processes the visits may need it.
+
+    Args:
+        scene: one of ``SCENES``.
+        out: folder to make; it must not exist, or be empty.
+        seed: everything is drawn from it: layout, shapes, sizes, textures, counts, light, paths.
+        frames: keyframes of each visit, at least 2.
+        report: told of every keyframe.
+        size: width and height of the images, pixels.
+        sensor: noise of depth, image and poses; None = the scene's own.
+
+    Raises:
+        InputError: an unknown scene, too few frames, or a folder that is not empty.
+        StorageError: the folder cannot be written.
+    """
+    out = Path(out)
+    if frames < 2:
+        raise InputError(f"{frames} frames are too few for a visit", "ask for at least 2")
+    if seed < 0:
+        raise InputError(f"{seed} is not a seed", "it is a whole number from 0 on")
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise InputError(f"{out} exists already and is not an empty folder", "name a new one")
+    drawn = build_scene(scene, seed, frames, size)
+    unfinished = out.with_name(f".{out.name}.{os.getpid()}.part")
+    try:
+        unfinished.mkdir(parents=True)
+        record(drawn, unfinished, sensor or drawn.sensor, report)
+        if out.exists():
+            out.rmdir()
+        unfinished.rename(out)
+    except OSError as error:
+        raise StorageError(f"cannot write {out}: {error.strerror or error}", "choose another place") from None
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+
+
+def build_scene(scene: str, seed: int, frames: int, size: tuple[int, int] = (640, 480)) -> SyntheticScene:
+    """Draw a scene without rendering it.
+
+    Raises:
+        InputError: there is no scene of that name.
+    """
+    if scene not in SCENES:
+        raise InputError(f"there is no scene {scene!r}", f"choose one of {', '.join(SCENES)}")
+    shop = Workshop(np.random.default_rng([SCENES.index(scene), seed]), TextureAtlas())
+    standard = PinholeCamera(640, 480, 525.0, 525.0, 319.5, 239.5)
+    module = importlib.import_module(f"pipeline.synthetic.{scene}")
+    drawn: SyntheticScene = module.build(shop, seed, frames, standard.resized(*size))
+    return drawn
+
+
+def record(
+    scene: SyntheticScene, folder: Path, sensor: SensorSettings, report: Report = silent
+) -> LabelledPoints:
+    """Record both visits of a scene into an existing folder and return its ground truth."""
+    rng = np.random.default_rng([SCENES.index(scene.name), scene.seed, 1])
+    renderers = [Renderer(*scene.mesh_of_visit(v), scene.atlas, scene.lighting[v]) for v in (0, 1)]
+    start = _FIRST_DAY + timedelta(minutes=int(rng.integers(0, 300 * 24 * 60)))
+    starts = (start, start + timedelta(days=int(rng.integers(1, 40)), minutes=int(rng.integers(-200, 200))))
+    frames = len(scene.paths[0])
+    seen = []
+    for visit in (0, 1):
+        captured_at = starts[visit].strftime("%Y-%m-%dT%H:%M:%SZ")
+        name = f"{scene.name} {scene.seed}, visit {visit + 1}"
+        archive = ArchiveWriter(folder / f"s{visit}", scene.camera, name, captured_at)
+        points = SeenPoints.none(scene.truth_voxel_m)
+        reported = misplace(scene.paths[visit], sensor, rng)
+        for index, T_world_camera in enumerate(scene.paths[visit]):
+            view = renderers[visit].view(scene.camera, T_world_camera)
+            rgb = expose(view, scene.lighting[visit].exposure, sensor, rng)
+            archive.add(rgb, measure(view, sensor, rng), reported[index], index * 0.5)
+            within = view.depth[::_TRUTH_STRIDE, ::_TRUTH_STRIDE]
+            valid = (within > sensor.min_range_m) & (within < sensor.max_range_m)
+            in_camera = scene.camera.strided(_TRUTH_STRIDE).backproject(np.where(valid, within, 0))[valid]
+            owner = view.object_id[::_TRUTH_STRIDE, ::_TRUTH_STRIDE][valid]
+            points.add(transform_points(T_world_camera, in_camera), owner)
+            report(ProgressEvent(_STAGE, visit * frames + index + 1, 2 * frames))
+        archive.close()
+        seen.append(points)
+    truth = _label(scene, (seen[0], seen[1]), renderers, sensor)
+    write_ply(folder / "gt.ply", truth)
+    (folder / "scene.json").write_text(json.dumps(describe(scene, truth), indent=1) + "\n")
+    return truth
+
+
+def _label(
+    scene: SyntheticScene,
+    seen: tuple[SeenPoints, SeenPoints],
+    renderers: list[Renderer],
+    sensor: SensorSettings,
+) -> LabelledPoints:
+    settings = TruthSettings()
+    partners: dict[int, set[int]] = {}
+    for thing in scene.objects:
+        if thing.replaced_by is not None:
+            partners[thing.object_id] = {thing.replaced_by}
+            partners[thing.replaced_by] = {thing.object_id}
+    known = [
+        observed(
+            seen[visit].points_world,
+            seen[visit].object_id,
+            scene.camera,
+            scene.paths[1 - visit],
+            renderers[1 - visit].first_hit,
+            sensor.max_range_m,
+            partners,
+            settings,
+        )
+        for visit in (0, 1)
+    ]
+    owners = (seen[0].object_id, seen[1].object_id)
+    static = {thing.object_id for thing in scene.objects if thing.fate == "static"}
+    moved = {thing.object_id for thing in scene.objects if thing.is_moved}
+    return assemble(seen, label_points(owners, (known[0], known[1]), static, moved, settings))
+
+
+def describe(scene: SyntheticScene, truth: LabelledPoints) -> dict[str, Any]:
+    """What is in a scene, for people: counts, and of every object its class, poses, fate and label."""
+    objects = []
+    for thing in scene.objects:
+        mine = truth.object_id == thing.object_id
+        labels = [sorted({int(v) for v in truth.label[mine & (truth.session == s)]}) for s in (0, 1)]
+        objects.append(
+            {
+                "object_id": thing.object_id,
+                "class": thing.class_name,
+                "fate": thing.fate,
+                "replaced_by": thing.replaced_by,
+                "T_world_object": [
+                    None if pose is None else np.round(pose, 6).tolist() for pose in thing.poses
+                ],
+                "extent_m": np.round(np.diff(thing.mesh.bounds, axis=0)[0].astype(float), 4).tolist(),
+                "points": [int((mine & (truth.session == s)).sum()) for s in (0, 1)],
+                "labels": [[_label_name(code) for code in codes] for codes in labels],
+            }
+        )
+    fates = [thing.fate for thing in scene.objects]
+    return {
+        "scene": scene.name,
+        "seed": scene.seed,
+        "frames": len(scene.paths[0]),
+        "object_count": len(objects),
+        "fates": {fate: fates.count(fate) for fate in sorted(set(fates))},
+        "points": {
+            _label_name(int(code)): int((truth.label == code).sum()) for code in np.unique(truth.label)
+        },
+        "objects": objects,
+    }
+
+
+def _label_name(code: int) -> str:
+    return "not scored" if code == NOT_SCORED else ChangeLabel(code).name.lower()

@@ -1,0 +1,127 @@
+"""A town square: in one visit a market fills it, in the other most of that is gone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.camera import PinholeCamera
+from pipeline.synthetic import furniture, goods, prints, street, textures
+from pipeline.synthetic.carpark import OUTDOOR_SENSOR
+from pipeline.synthetic.lighting import daylight
+from pipeline.synthetic.paths import walk
+from pipeline.synthetic.props import Arrangement, Prop, Workshop, fates, scatter
+from pipeline.synthetic.shapes import Mesh, box, join, pose
+from pipeline.synthetic.world import SyntheticScene
+
+
+def square(shop: Workshop, width: float, depth: float) -> Mesh:
+    """Paving with bands of another stone, and houses on all four sides."""
+    rng = shop.rng
+    paving = shop.tile(
+        textures.masonry(
+            rng, shop.near((150, 142, 130), 14), (104, 98, 90), shop.count(6, 12), shop.count(4, 8), 512
+        ),
+        macro=0.13,
+    )
+    band = shop.tile(textures.masonry(rng, shop.near((110, 106, 102), 12), (80, 78, 74), 4, 4), macro=0.08)
+    parts = [box((-width / 2 - 4, -depth / 2 - 4, -0.2), (width / 2 + 4, depth / 2 + 4, 0), paving, 3.0)]
+    for x in np.arange(-width / 2 + 2, width / 2, shop.between(4.5, 7)):
+        parts.append(box((x, -depth / 2, 0), (x + 0.4, depth / 2, 0.004), band, 1.0, x))
+    height = shop.between(7, 11)
+    for side in range(4):
+        length, distance = (width, depth / 2) if side % 2 == 0 else (depth, width / 2)
+        houses = street.facade_row(shop, length, height)
+        parts.append(join([houses.at(0, distance)]).at(yaw=-side * np.pi / 2))
+    return join(parts)
+
+
+def market_thing(shop: Workshop, colours: list) -> Prop:
+    """Something that comes and goes with a market."""
+    match int(shop.rng.integers(7)):
+        case 0 | 1:
+            size = (shop.between(2.6, 4.0), shop.between(2.4, 3.2))
+            pair = [colours[int(i)] for i in shop.rng.choice(len(colours), 2, replace=False)]
+            return street.tent(shop, size, [shop.near(c, 12) for c in pair])
+        case 2 | 3:
+            return street.stall(shop, shop.between(1.6, 2.8))
+        case 4:
+            return street.parasol(shop, shop.between(1.1, 1.6))
+        case 5:
+            size = (shop.between(0.6, 1.0), shop.between(0.5, 0.8), shop.between(0.5, 1.0))
+            return goods.crate(shop, size, shop.near((160, 120, 78), 24))
+        case _:
+            size = (shop.between(0.6, 0.9), shop.between(0.5, 0.8), shop.between(0.5, 0.9))
+            return furniture.carton(
+                shop, size, shop.near((186, 146, 102), 14), prints.vivid(shop.rng, 30, 140)
+            )
+
+
+def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> SyntheticScene:
+    """Draw a market square."""
+    rng = shop.rng
+    width, depth = shop.between(25, 31), shop.between(21, 26)
+    plan = Arrangement()
+    colours = [prints.vivid(rng, 120, 235) for _ in range(4)] + [np.array([232.0, 228.0, 218.0])]
+    lasting: list[Prop] = [street.fountain(shop, shop.between(1.4, 2.0))]
+    lasting += [street.tree(shop, shop.between(3.6, 5.5)) for _ in range(shop.count(3, 6))]
+    lasting += [street.lamppost(shop, shop.between(3.2, 4.2)) for _ in range(shop.count(3, 5))]
+    lasting += [street.bench(shop, shop.between(1.6, 2.2)) for _ in range(shop.count(3, 5))]
+    passing = [market_thing(shop, colours) for _ in range(shop.count(22, 30))]
+    passing.sort(key=lambda prop: -prop.radius)
+    # The camera walks round the square: the ring of its path stays free of things.
+    inner = (width / 2 - 5.2, depth / 2 - 5.2)
+    everything = lasting[:1] + passing[:12] + lasting[1:] + passing[12:]
+    radii = [min(thing.radius, 1.2) if thing.class_name == "tree" else thing.radius for thing in everything]
+    places = scatter(rng, (-inner[0], -inner[1]), inner, radii, 0.25, 300)
+    spots: list[tuple[np.ndarray, Prop]] = []
+    for thing, place in zip(everything, places, strict=True):
+        if place is None:
+            continue
+        T = pose(place[0], place[1], 0, rng.integers(4) * np.pi / 2 + rng.normal(0, 0.2))
+        if any(thing is kept for kept in lasting):
+            plan.keep(thing, T)
+        else:
+            spots.append((T, thing))
+    arriving = rng.random() < 0.5
+    shares = {"appeared": 0.55, "disappeared": 0.08} if arriving else {"appeared": 0.08, "disappeared": 0.55}
+    dealt = fates(rng, len(spots), moved=0.12, spare=0.1, replaced=0.06, **shares)
+    free = [(T, thing.radius) for (T, thing), fate in zip(spots, dealt, strict=True) if fate == "spare"]
+    for (T, thing), fate in zip(spots, dealt, strict=True):
+        if fate == "spare":
+            continue
+        goal = None
+        if fate == "moved":
+            fits = [i for i, (_, radius) in enumerate(free) if radius > thing.radius - 0.4]
+            goal = free.pop(fits[0])[0] if fits else None
+        plan.deal(fate, thing, T, goal, pose(*rng.normal(0, 0.05, 2), 0, rng.normal(0, 0.03)))
+
+    return SyntheticScene(
+        name="market",
+        seed=seed,
+        atlas=shop.atlas,
+        background=square(shop, width, depth),
+        objects=plan.objects(rng),
+        lighting=(daylight(shop), daylight(shop)),
+        paths=(_round(shop, 0, width, depth, frames), _round(shop, 1, width, depth, frames)),
+        camera=camera,
+        sensor=OUTDOOR_SENSOR,
+        truth_voxel_m=0.05,
+    )
+
+
+def _round(shop: Workshop, visit: int, width: float, depth: float, frames: int) -> np.ndarray:
+    """Round the square near the houses, looking across it."""
+    rng = shop.rng
+    laps = 1.0 if visit == 0 else shop.between(0.78, 0.92)
+    start, turn = shop.between(0, 2 * np.pi), rng.choice([-1.0, 1.0])
+    angle = start + turn * np.linspace(0, 2 * np.pi * laps, 17)
+    margin, height = shop.between(2.4, 3.4), shop.between(1.7, 2.4)
+    # A rounded rectangle: a circle pushed outwards.
+    unit = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    unit /= (np.abs(unit) ** 4).sum(1, keepdims=True) ** 0.25
+    positions = np.concatenate(
+        [unit * [width / 2 - margin, depth / 2 - margin], height + rng.normal(0, 0.08, (17, 1))], axis=1
+    )
+    ahead = angle + np.pi - turn * shop.between(0.2, 0.7)
+    targets = np.stack([np.cos(ahead) * width * 0.12, np.sin(ahead) * depth * 0.12, np.full(17, 0.9)], axis=1)
+    return walk(positions, targets, frames, rng, 0.04)

@@ -1,0 +1,173 @@
+"""What builders of objects share: where they draw from, what they return, what becomes of it between visits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipeline.synthetic.atlas import TextureAtlas
+from pipeline.synthetic.shapes import Mesh
+from pipeline.synthetic.textures import Colour, Tile, mottled
+from pipeline.synthetic.world import Pose, SceneObject
+
+
+@dataclass(frozen=True)
+class Prop:
+    """A thing to stand somewhere.
+
+    Attributes:
+        class_name: for people.
+        mesh: standing on z = 0 around the z axis.
+        lookalike: makes another of the same family: similar shape and colour, its own texture.
+    """
+
+    class_name: str
+    mesh: Mesh
+    lookalike: Callable[[], Prop]
+
+    @property
+    def height(self) -> float:
+        """Metres above what it stands on."""
+        return float(self.mesh.bounds[1, 2])
+
+    @property
+    def radius(self) -> float:
+        """Metres from its axis to its farthest corner, seen from above."""
+        return float(np.hypot(*np.abs(self.mesh.bounds[:, :2]).max(0)))
+
+
+@dataclass(frozen=True)
+class Workshop:
+    """Where builders draw numbers and put textures."""
+
+    rng: np.random.Generator
+    atlas: TextureAtlas
+
+    def between(self, low: float, high: float) -> float:
+        """A number, uniform in [low, high)."""
+        return float(self.rng.uniform(low, high))
+
+    def count(self, low: int, high: int) -> int:
+        """A whole number, uniform in low..high."""
+        return int(self.rng.integers(low, high + 1))
+
+    def tile(self, image: Tile, gloss: float = 0.0, macro: float = 0.0) -> int:
+        """Put a texture into the atlas."""
+        return self.atlas.add(image, gloss, macro)
+
+    def paint(self, colour: Colour, contrast: float = 0.08, gloss: float = 0.0) -> int:
+        """A small mottled tile of one colour, each with its own marks."""
+        return self.tile(mottled(self.rng, colour, contrast, size=128), gloss)
+
+    def near(self, colour: Colour, spread: float = 12.0) -> np.ndarray:
+        """A colour close to the given one: ``spread`` of 255 in lightness, a quarter of it in hue."""
+        lightness, hue = self.rng.normal(0, spread / 100), self.rng.normal(0, spread / 400, 3)
+        return np.clip(np.asarray(colour, dtype=np.float64) * (1 + lightness) * (1 + hue), 8, 250)
+
+    def similar(self, sizes: Sequence[float], spread: float = 0.03) -> list[float]:
+        """Sizes close to the given ones."""
+        return [float(size * np.clip(self.rng.normal(1, spread), 0.9, 1.1)) for size in sizes]
+
+
+@dataclass
+class Arrangement:
+    """Collects what stands where in each visit; ids are dealt at the end so that they tell nothing."""
+
+    entries: list[tuple[Prop, Pose | None, Pose | None, int | None]] = field(default_factory=list)
+
+    def keep(self, prop: Prop, pose: Pose) -> None:
+        """The same thing at the same place in both visits."""
+        self.entries.append((prop, pose, pose, None))
+
+    def vanish(self, prop: Prop, pose: Pose) -> None:
+        """There in the previous visit only."""
+        self.entries.append((prop, pose, None, None))
+
+    def arrive(self, prop: Prop, pose: Pose) -> None:
+        """There in the current visit only."""
+        self.entries.append((prop, None, pose, None))
+
+    def move(self, prop: Prop, before: Pose, after: Pose) -> None:
+        """Carried from one place to another."""
+        self.entries.append((prop, before, after, None))
+
+    def replace(self, prop: Prop, pose: Pose, successor: Prop, successor_pose: Pose) -> None:
+        """Taken away, and another thing put in its place."""
+        self.entries.append((prop, pose, None, len(self.entries) + 1))
+        self.entries.append((successor, None, successor_pose, None))
+
+    def deal(
+        self, fate: str, prop: Prop, pose: Pose, spare: Pose | None = None, jitter: Pose | None = None
+    ) -> None:
+        """Enter a prop by the name of its fate.
+
+        Args:
+            fate: static, disappeared, appeared, moved (to ``spare``) or replaced.
+            prop: the thing.
+            pose: where it stands.
+            spare: where a moved thing goes; without one it stays.
+            jitter: small change of pose (4, 4) of a successor relative to what it replaces.
+        """
+        if fate == "moved" and spare is not None:
+            before, after = pose, spare
+            self.move(prop, before, after)
+        elif fate == "disappeared":
+            self.vanish(prop, pose)
+        elif fate == "appeared":
+            self.arrive(prop, pose)
+        elif fate == "replaced":
+            self.replace(prop, pose, prop.lookalike(), pose if jitter is None else pose @ jitter)
+        else:
+            self.keep(prop, pose)
+
+    def objects(self, rng: np.random.Generator) -> tuple[SceneObject, ...]:
+        """All objects in the order of their shuffled ids."""
+        ids = rng.permutation(len(self.entries)) + 1
+        made = [
+            SceneObject(
+                object_id=int(number),
+                class_name=prop.class_name,
+                mesh=prop.mesh,
+                poses=(before, after),
+                replaced_by=None if successor is None else int(ids[successor]),
+            )
+            for number, (prop, before, after, successor) in zip(ids, self.entries, strict=True)
+        ]
+        return tuple(sorted(made, key=lambda thing: thing.object_id))
+
+
+def fates(rng: np.random.Generator, count: int, **shares: float) -> list[str]:
+    """Shuffled fates of ``count`` things; each share is met to the nearest whole number, the rest is static."""
+    dealt = [name for name, share in shares.items() for _ in range(round(share * count))][:count]
+    dealt += ["static"] * (count - len(dealt))
+    return [dealt[i] for i in rng.permutation(count)]
+
+
+def scatter(
+    rng: np.random.Generator,
+    low: Colour,
+    high: Colour,
+    radii: Sequence[float],
+    gap: float = 0.02,
+    tries: int = 60,
+) -> list[tuple[float, float] | None]:
+    """Places in a rectangle where discs of the given radii do not touch; None where there was no room."""
+    placed: list[tuple[float, float, float]] = []
+    places: list[tuple[float, float] | None] = []
+    for radius in radii:
+        found = None
+        for _ in range(tries):
+            x, y = (
+                float(rng.uniform(min(l + radius, h - radius), h - radius + 1e-6))
+                for l, h in zip(low, high, strict=True)
+            )
+            if x - radius < low[0] - 0.05 or y - radius < low[1] - 0.05:
+                break
+            if all(np.hypot(x - px, y - py) > radius + pr + gap for px, py, pr in placed):
+                found = (x, y)
+                placed.append((x, y, radius))
+                break
+        places.append(found)
+    return places

@@ -1,0 +1,178 @@
+"""Ground truth: what the cameras of each visit truly saw, labelled with what could be known from both.
+
+Seen but elsewhere is ``moved``; a place that the other visit never looked at is not scored (255).
+Occluded is not observed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.camera import PinholeCamera, invert_rigid, transform_points
+from pipeline.ply import NOT_SCORED, LabelledPoints
+from pipeline.result import ChangeLabel
+
+# (camera centre in the world, points in the world) -> distance of the first hit over that of the point,
+# and the object hit; see Renderer.first_hit.
+FirstHit = Callable[[NDArray[np.float64], NDArray[np.float32]], tuple[NDArray[np.float32], NDArray[np.int32]]]
+
+COLOURS: dict[int, tuple[int, int, int]] = {
+    ChangeLabel.STATIC: (46, 160, 67),
+    ChangeLabel.APPEARED: (218, 54, 51),
+    ChangeLabel.DISAPPEARED: (47, 111, 235),
+    ChangeLabel.MOVED: (227, 160, 8),
+    NOT_SCORED: (128, 128, 128),
+}
+
+
+@dataclass(frozen=True)
+class TruthSettings:
+    """When an object counts as seen, and its place as observed."""
+
+    observed_share: float = 0.5  # of an object's points whose place the other visit must have observed
+    min_points: int = 20  # an object of fewer points in a visit was not seen enough there
+    min_seen_share: float = 0.15  # ... nor one of less than this share of its points in the other visit
+    tolerance_m: float = 0.02
+    tolerance_per_m: float = 0.005
+
+
+@dataclass
+class SeenPoints:
+    """Points that one visit saw, thinned to one per voxel and object.
+
+    Attributes:
+        voxel_m: edge of a voxel, metres.
+        points_world: (N, 3) float32, exactly on the surfaces.
+        object_id: (N,) int32, 0 = background.
+    """
+
+    voxel_m: float
+    points_world: NDArray[np.float32]
+    object_id: NDArray[np.int32]
+
+    @classmethod
+    def none(cls, voxel_m: float) -> SeenPoints:
+        """Nothing seen yet."""
+        return cls(voxel_m, np.zeros((0, 3), dtype=np.float32), np.zeros(0, dtype=np.int32))
+
+    def add(self, points_world: NDArray[np.float32], object_id: NDArray[np.int32]) -> None:
+        """Add what a keyframe saw; what was there first stays."""
+        points = np.concatenate([self.points_world, points_world])
+        owners = np.concatenate([self.object_id, object_id])
+        cells = np.floor(points / self.voxel_m).astype(np.int64) + (1 << 15)
+        key = cells[:, 0] << 48 ^ cells[:, 1] << 32 ^ cells[:, 2] << 16 ^ owners
+        _, first = np.unique(key, return_index=True)
+        first.sort()
+        self.points_world, self.object_id = points[first], owners[first]
+
+
+def observed(
+    points_world: NDArray[np.float32],
+    object_id: NDArray[np.int32],
+    camera: PinholeCamera,
+    path: NDArray[np.float64],
+    first_hit: FirstHit,
+    max_range_m: float,
+    partners: dict[int, set[int]],
+    settings: TruthSettings,
+) -> NDArray[np.bool_]:
+    """Whether the place of each point was observed by another visit: seen, or seen through.
+
+    Args:
+        points_world: (N, 3) of one visit.
+        object_id: (N,) of the points.
+        camera: of the other visit.
+        path: true T_world_camera of the other visit, (frames, 4, 4).
+        first_hit: casts rays into the world of the other visit.
+        max_range_m: farther away nothing is measured.
+        partners: for an object, those that stand in its place in the other visit: to see them is to
+            observe the place, although they hide the very point.
+        settings: tolerances.
+    """
+    known = np.zeros(len(points_world), dtype=bool)
+    for T_world_camera in path:
+        open_points = np.flatnonzero(~known)
+        if not len(open_points):
+            break
+        in_camera = transform_points(invert_rigid(T_world_camera), points_world[open_points])
+        pixel, z = camera.project(in_camera)
+        inside = (z > 0.1) & (z < max_range_m)
+        inside &= (
+            (pixel > -0.5).all(1) & (pixel[:, 0] < camera.width - 0.5) & (pixel[:, 1] < camera.height - 0.5)
+        )
+        candidates = open_points[inside]
+        if not len(candidates):
+            continue
+        centre = T_world_camera[:3, 3]
+        share, owner = first_hit(centre, points_world[candidates])
+        distance = np.linalg.norm(points_world[candidates] - centre, axis=1)
+        tolerance = settings.tolerance_m + settings.tolerance_per_m * distance
+        free = share * distance >= distance - tolerance
+        hidden = np.flatnonzero(~free & (owner > 0))
+        free[hidden] = [int(owner[i]) in partners.get(int(object_id[candidates[i]]), ()) for i in hidden]
+        known[candidates[free]] = True
+    return known
+
+
+def label_points(
+    object_id: tuple[NDArray[np.int32], NDArray[np.int32]],
+    known: tuple[NDArray[np.bool_], NDArray[np.bool_]],
+    static: set[int],
+    moved: set[int],
+    settings: TruthSettings,
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Labels of the points of both visits.
+
+    Args:
+        object_id: of the points of visit 0 and visit 1, 0 = background.
+        known: whether the other visit observed the place of each point.
+        static: objects that stand at the same place in both visits.
+        moved: objects that stand at another place in each visit; all others are there in one visit only.
+        settings: when an object counts as seen.
+
+    Returns:
+        Labels of visit 0 and visit 1: ``ChangeLabel`` codes or 255.
+    """
+    labels = [np.where(known[visit], ChangeLabel.STATIC, NOT_SCORED).astype(np.uint8) for visit in (0, 1)]
+    for number in np.union1d(object_id[0], object_id[1]):
+        if number == 0:
+            continue
+        mine = [ids == number for ids in object_id]
+        counts = [int(chosen.sum()) for chosen in mine]
+        least = max(settings.min_points, settings.min_seen_share * max(counts))
+        for visit in (0, 1):
+            if not counts[visit]:
+                continue
+            place_observed = bool(known[visit][mine[visit]].mean() >= settings.observed_share)
+            label: int = (ChangeLabel.DISAPPEARED, ChangeLabel.APPEARED)[visit]
+            if int(number) in static:
+                label = ChangeLabel.STATIC if all(counts) or place_observed else NOT_SCORED
+            elif int(number) in moved and min(counts) >= least:
+                label = ChangeLabel.MOVED
+            elif not place_observed or counts[visit] < counts[1 - visit]:
+                # Of a moved object seen well in the other visit only, these few points tell nothing.
+                label = NOT_SCORED
+            labels[visit][mine[visit]] = label
+    return labels[0], labels[1]
+
+
+def assemble(
+    seen: tuple[SeenPoints, SeenPoints], labels: tuple[NDArray[np.uint8], NDArray[np.uint8]]
+) -> LabelledPoints:
+    """One cloud of both visits, coloured by label."""
+    label = np.concatenate(labels)
+    colours = np.zeros((256, 3), dtype=np.uint8)
+    for code, colour in COLOURS.items():
+        colours[code] = colour
+    return LabelledPoints(
+        points_world=np.concatenate([points.points_world for points in seen]),
+        colours=colours[label],
+        session=np.repeat(np.array([0, 1], dtype=np.uint8), [len(points.object_id) for points in seen]),
+        label=label,
+        object_id=np.concatenate([points.object_id for points in seen]),
+        confidence=np.ones(len(label), dtype=np.float32),
+    )
