@@ -1,0 +1,186 @@
+"""What has been decided about an open result, shared by all browsers that look at it.
+
+Writes go to the journal first; only then does anybody see them. Other processes' decisions are followed
+by asking the journal once a second.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from oasisview.review import Decision, Event, FinalLabel, Journal, Kind
+from pipeline.errors import OasisError
+from pipeline.result import ChangeLabel, Result
+
+POLL_S = 1.0
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A person's standing decision about an object.
+
+    ``accepted`` = the machine's label was confirmed; ``at`` is UTC in ISO 8601.
+    """
+
+    label: ChangeLabel
+    accepted: bool
+    who: str
+    at: str
+    reason: str
+
+
+Listener = Callable[[frozenset[int]], None]
+
+
+class SharedDecisions:
+    """The journal of a result, its present state, and who wants to hear of changes.
+
+    Methods may be called from any thread and touch the disk: never call them on the event loop.
+    """
+
+    def __init__(self, result: Result) -> None:
+        self._machine = {item.object_id: item.label for item in result.objects}
+        self._journal = Journal.of(result)
+        self._listeners: list[Listener] = []
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._final: dict[int, FinalLabel] = self._journal.final_labels()
+        self._last_event_id = self._journal.last_event_id
+        self._verdicts = _verdicts(self._final)
+        self._poller = threading.Thread(target=self._poll, name="oasisview-decisions", daemon=True)
+        self._poller.start()
+
+    @property
+    def verdicts(self) -> Mapping[int, Verdict]:
+        """Standing decisions by object id; a snapshot that never changes under the reader."""
+        return self._verdicts
+
+    @property
+    def last_event_id(self) -> int:
+        """The last event that :attr:`verdicts` includes."""
+        return self._last_event_id
+
+    def label_of(self, object_id: int) -> ChangeLabel:
+        """Final label of an object: the inspector's, else the machine's."""
+        verdict = self._verdicts.get(object_id)
+        if verdict is not None:
+            return verdict.label
+        return self._machine.get(object_id, ChangeLabel.UNKNOWN)
+
+    def history(self) -> tuple[Event, ...]:
+        """Every event of the journal, oldest first."""
+        return self._journal.changes_since(0)
+
+    def disagreement(self, object_id: int | None) -> str:
+        """A sentence if people's standing labels of an object differ, else empty."""
+        said: dict[str, Decision] = {}
+        for decision in self._journal.decisions():
+            if decision.object_id == object_id and decision.kind is not Kind.NOTE and not decision.undone:
+                said[decision.who] = decision
+        if len({decision.new_label for decision in said.values()}) < 2:
+            return ""
+        voices = ", ".join(f"{who} says {d.new_label.name.lower()}" for who, d in said.items())
+        return f"Inspectors disagree: {voices}. The latest decision counts."
+
+    def subscribe(self, listener: Listener) -> None:
+        """Call ``listener`` with the objects that changed, on whatever thread noticed."""
+        with self._lock:
+            self._listeners.append(listener)
+
+    def unsubscribe(self, listener: Listener) -> None:
+        """Stop calling it."""
+        with self._lock:
+            if listener in self._listeners:
+                self._listeners.remove(listener)
+
+    def decide(
+        self, object_id: int, label: ChangeLabel, *, who: str, reason: str, seen_event_id: int | None
+    ) -> Decision:
+        """Store a label; raises as ``Journal.decide``. The decision is on the disk when this returns."""
+        if label is self._machine.get(object_id):
+            decision = self._journal.accept(object_id, who=who, why=reason, expected_event_id=seen_event_id)
+        else:
+            decision = self._journal.decide(
+                object_id, label, who=who, why=reason, expected_event_id=seen_event_id
+            )
+        self.refresh()
+        return decision
+
+    def note(self, object_id: int, text: str, *, who: str) -> Decision:
+        """Store a remark without a label; raises as ``Journal.note``."""
+        decision = self._journal.note(object_id, text, who=who)
+        self.refresh()
+        return decision
+
+    def undo(self, who: str) -> Decision | None:
+        """Take back the person's latest decision; None if there is none."""
+        decision = self._journal.undo(who)
+        self.refresh()
+        return decision
+
+    def redo(self, who: str) -> Decision | None:
+        """Restore what the person undid last; None if there is nothing."""
+        decision = self._journal.redo(who)
+        self.refresh()
+        return decision
+
+    def can_undo(self, who: str) -> bool:
+        """Whether undo would do something."""
+        return self._journal.can_undo(who)
+
+    def can_redo(self, who: str) -> bool:
+        """Whether redo would do something."""
+        return self._journal.can_redo(who)
+
+    def refresh(self) -> frozenset[int]:
+        """Follow the journal; tells the listeners which objects changed, and returns them."""
+        with self._lock:
+            events = self._journal.changes_since(self._last_event_id)
+            if not events:
+                return frozenset()
+            self._final = self._journal.final_labels()
+            self._verdicts = _verdicts(self._final)
+            self._last_event_id = events[-1].id
+            listeners = tuple(self._listeners)
+        changed = frozenset(event.object_id for event in events)
+        for listener in listeners:
+            try:
+                listener(changed)
+            except Exception:  # one broken page must not keep the others from hearing
+                _log.exception("a page could not be refreshed")
+        return changed
+
+    def close(self) -> None:
+        """Stop following and let go of the file."""
+        self._stop.set()
+        self._poller.join(timeout=POLL_S + 5)
+        self._journal.close()
+
+    def _poll(self) -> None:
+        failed = ""
+        while not self._stop.wait(POLL_S):
+            try:
+                self.refresh()
+                failed = ""
+            except OasisError as error:
+                if str(error) != failed:
+                    failed = str(error)
+                    _log.warning("%s", error)
+
+
+def _verdicts(final: Mapping[int, FinalLabel]) -> dict[int, Verdict]:
+    return {
+        object_id: Verdict(
+            label=entry.label,
+            accepted=not entry.overridden,
+            who=entry.decided_by,
+            at=entry.decided_at or "",
+            reason=entry.why or "",
+        )
+        for object_id, entry in final.items()
+        if entry.decided_by is not None
+    }

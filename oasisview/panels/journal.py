@@ -1,0 +1,56 @@
+"""Who decided what, when and why: the journal as a list, newest first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+
+from oasisview import wording
+from oasisview.panels.markup import chip, empty, sends
+from oasisview.review import Event, Kind
+from oasisview.shell import escape
+from oasisview.wording import LABEL_NAMES
+
+SHOWN = 300
+
+
+def when(at: str) -> str:
+    """An ISO 8601 time in this machine's zone, to the minute; the text itself if it is no time."""
+    try:
+        return datetime.fromisoformat(at).astimezone().strftime("%d %b %Y, %H:%M")
+    except ValueError:
+        return at
+
+
+def journal_html(events: Sequence[Event]) -> str:
+    """The panel; undone decisions are struck through."""
+    if not events:
+        return f'<div class="oa oa-journal">{empty(wording.NO_DECISIONS)}</div>'
+    undone: set[int] = set()
+    for event in events:
+        if event.target_id is not None:
+            (undone.add if event.kind is Kind.UNDO else undone.discard)(event.target_id)
+    rows = "".join(_row(event, struck=event.id in undone) for event in reversed(events[-SHOWN:]))
+    more = f'<div class="oa-note">{len(events) - SHOWN} older entries are in review.sqlite.</div>'
+    return (
+        f'<div class="oa oa-journal"><div class="oa-note">{len(events)} entries, newest first. '
+        f"Nothing is ever removed; undo is an entry too.</div>{rows}{more if len(events) > SHOWN else ''}</div>"
+    )
+
+
+def _row(event: Event, *, struck: bool) -> str:
+    new, old = LABEL_NAMES[event.new_label], LABEL_NAMES[event.old_label]
+    what = {
+        Kind.ACCEPT: f"accepted as {new}",
+        Kind.LABEL: f"{old} \u2192 {new}",
+        Kind.NOTE: "note",
+        Kind.UNDO: f"undone, {new} again",
+        Kind.REDO: f"redone, {new} again",
+    }[event.kind]
+    reason = f"<q>{escape(event.why)}</q>" if event.why else ""
+    return (
+        f'<div class="oa-entry{" oa-undone" if struck else ""}" role="button" tabindex="0" '
+        f'data-event="{event.id}" {sends("select", event.object_id)}>{chip(event.new_label)}'
+        f"<span><b>#{event.object_id}</b> {what}{reason}"
+        f"<small>{escape(event.who)} \u00b7 {escape(when(event.at))}</small></span></div>"
+    )

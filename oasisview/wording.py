@@ -1,0 +1,227 @@
+"""What the viewer says about an object, in words an inspector uses: plain text, never markup.
+
+One place for all of it, so that the queue, the evidence and the journal say the same thing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.result import ChangeLabel, MapObject, MatchCase, Result
+from pipeline.settings import Settings
+
+LABEL_WORDS: dict[ChangeLabel, str] = {
+    ChangeLabel.STATIC: "same",
+    ChangeLabel.APPEARED: "new",
+    ChangeLabel.DISAPPEARED: "gone",
+    ChangeLabel.MOVED: "moved",
+    ChangeLabel.UNKNOWN: "unknown",
+}
+LABEL_NAMES: dict[ChangeLabel, str] = {label: label.name.lower() for label in ChangeLabel}
+CASE_WORDS: dict[MatchCase, str] = {
+    MatchCase.CONFIDENT: "case 1: sure match",
+    MatchCase.PARTIAL: "case 2: seen in part",
+    MatchCase.LOOKALIKE: "case 3: looks alike, is not",
+    MatchCase.NONE: "case 4: no match",
+}
+NOTHING_SELECTED = (
+    "Click an object in the map, in an image or in the queue, or press J for the most doubtful one."
+)
+NO_DECISIONS = "No decisions yet. Press Enter to accept a label, or 1 to 5 to set another one."
+NO_SHARED_VIEW = "No keyframe of the other visit shows this view."
+NO_OBJECTS = "No objects were found in these visits, so there is nothing to review."
+NOTHING_IN_QUEUE = "Nothing to show: every label is switched off above. Click a label to show it."
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The limits a result was decided with, as its manifest stores them.
+
+    Attributes:
+        tau_sigma: least share of matching patches; tau_s: least match quality.
+        tau_d_m: largest displacement of an object that stayed, metres.
+        nu_min: least share of a place that the other visit must have looked at.
+    """
+
+    tau_sigma: float
+    tau_s: float
+    tau_d_m: float
+    nu_min: float
+
+    @classmethod
+    def of(cls, result: Result) -> Limits:
+        """The limits of a result; what an old manifest does not hold takes the documented default."""
+        change = result.manifest.get("settings", {}).get("change", {})
+        default = Settings().change
+        matrix = result.score_matrix
+        return cls(
+            tau_sigma=float(matrix.tau_sigma),
+            tau_s=float(matrix.tau_s),
+            tau_d_m=float(change.get("tau_d_m", default.tau_d_m)),
+            nu_min=float(change.get("nu_min", default.nu_min)),
+        )
+
+
+def visit_word(session: int, sessions: int = 2) -> str:
+    """Before / After for a pair of visits; Visit 1, 2, ... for longer series."""
+    if sessions > 2:
+        return f"Visit {session + 1}"
+    return ("Before", "After")[session]
+
+
+def percent(share: float) -> str:
+    """A share in [0, 1] as whole percent."""
+    return f"{share:.0%}"
+
+
+def length(metres: float) -> str:
+    """Centimetres below one metre, else metres with two decimals."""
+    return f"{metres * 100:.0f} cm" if metres < 1.0 else f"{metres:.2f} m"
+
+
+def duration(seconds: float) -> str:
+    """Seconds, or minutes and seconds from one minute on."""
+    whole = round(seconds)
+    return f"{whole} s" if whole < 60 else f"{whole // 60} min {whole % 60:02d} s"
+
+
+def size(extent_m: tuple[float, float, float]) -> str:
+    """Side lengths of the bounds, longest first, in one unit."""
+    longest_first = sorted(extent_m, reverse=True)
+    if longest_first[0] < 1.0:
+        return " x ".join(f"{side * 100:.0f}" for side in longest_first) + " cm"
+    return " x ".join(f"{side:.2f}" for side in longest_first) + " m"
+
+
+def object_name(object_id: int) -> str:
+    """How an object is called everywhere; embedded perception does not name classes."""
+    return f"object #{object_id}"
+
+
+def queue_fact(item: MapObject, label: ChangeLabel) -> str:
+    """The one line under an object in the queue."""
+    if label is item.label:
+        if item.replaced_by is not None:
+            return f"replaced by #{item.replaced_by}"
+        if item.replaces is not None:
+            return f"replaces #{item.replaces}"
+    if label is ChangeLabel.MOVED and item.displacement_m is not None:
+        return f"moved {length(item.displacement_m)}"
+    return {
+        ChangeLabel.STATIC: "in place",
+        ChangeLabel.APPEARED: "new here",
+        ChangeLabel.DISAPPEARED: "gone",
+        ChangeLabel.MOVED: "moved",
+        ChangeLabel.UNKNOWN: "not decided",
+    }[label]
+
+
+def why(item: MapObject, limits: Limits) -> str:
+    """Why the machine gave this object its label."""
+    match item.label:
+        case ChangeLabel.STATIC:
+            return _why_static(item, limits)
+        case ChangeLabel.MOVED:
+            return _why_moved(item, limits)
+        case ChangeLabel.APPEARED:
+            return _why_one_sided(item, appeared=True)
+        case ChangeLabel.DISAPPEARED:
+            return _why_one_sided(item, appeared=False)
+        case _:
+            return _why_unknown(item, limits)
+
+
+def _match_words(item: MapObject) -> str:
+    return f"{percent(item.sigma)} of its patches match, with quality {item.s_bar:.2f}"
+
+
+def _why_static(item: MapObject, limits: Limits) -> str:
+    if len(item.sightings) < 2:
+        visit = "earlier" if item.sightings and item.sightings[0].session == 0 else "later"
+        return (
+            f"Made out as an object on the {visit} visit only, but its place did not change: "
+            f"only {percent(item.seen_through)} of its volume was seen to be empty on the other visit."
+        )
+    place = ""
+    if item.displacement_m is not None:
+        place = f", within {length(max(item.displacement_m, 0.01))} of where it was"
+    if item.case is MatchCase.CONFIDENT:
+        return f"Same object, same place: {_match_words(item)}{place}."
+    return (
+        f"Same place, nothing changed there{place}: only {percent(item.seen_through)} of its volume was "
+        f"seen to be empty on the other visit. The match alone would not be enough ({_match_words(item)})."
+    )
+
+
+def _why_moved(item: MapObject, limits: Limits) -> str:
+    away = "another place" if item.displacement_m is None else f"{length(item.displacement_m)} away"
+    return (
+        f"Same object, new place: {_match_words(item)}, but it now stands {away} "
+        f"(up to {length(limits.tau_d_m)} counts as in place)."
+    )
+
+
+def _why_one_sided(item: MapObject, *, appeared: bool) -> str:
+    if appeared:
+        text = (
+            f"Nothing on the earlier visit matches this object, and {percent(item.coverage)} of its place "
+            "had been looked at then."
+        )
+        if item.replaces is not None:
+            text += f" It stands where {object_name(item.replaces)} was."
+    else:
+        text = (
+            f"Nothing on the later visit matches this object, and {percent(item.coverage)} of the place "
+            "where it stood was looked at again."
+        )
+        if item.replaced_by is not None:
+            text += f" {object_name(item.replaced_by).capitalize()} stands there now."
+    if item.seen_through > 0:
+        visit = "then" if appeared else "now"
+        text += f" {percent(item.seen_through)} of its volume is seen to be empty {visit}."
+    return text
+
+
+def _why_unknown(item: MapObject, limits: Limits) -> str:
+    if item.coverage < limits.nu_min:
+        return (
+            f"Only {percent(item.coverage)} of this place was looked at on the other visit; "
+            f"{percent(limits.nu_min)} are needed. It may still be there."
+        )
+    if item.case is MatchCase.PARTIAL:
+        return (
+            f"Not enough to decide. What matches is convincing (quality {item.s_bar:.2f}), but only "
+            f"{percent(item.sigma)} of its patches do; {percent(limits.tau_sigma)} are needed. "
+            "It was probably seen only in part."
+        )
+    if item.case is MatchCase.LOOKALIKE:
+        return (
+            f"Not enough to decide. Something alike is there ({percent(item.sigma)} of the patches match), "
+            f"but the quality of {item.s_bar:.2f} is below {limits.tau_s:.2f}, and its place is not "
+            "clearly changed either."
+        )
+    return (
+        f"Not enough to decide: {_match_words(item)}, and only {percent(item.seen_through)} of its volume "
+        "was seen to be empty on the other visit."
+    )
+
+
+def overridden(label: ChangeLabel, machine: ChangeLabel, who: str) -> str:
+    """The sentence in front of the machine's reasons once an inspector said otherwise."""
+    return f"{who} set this to {LABEL_NAMES[label]}; the machine said {LABEL_NAMES[machine]}."
+
+
+def rejection(sigma: float, s_bar: float, limits: Limits, *, partner_id: int | None) -> str:
+    """Why a candidate is not the counterpart."""
+    if s_bar < limits.tau_s <= 1 and sigma >= limits.tau_sigma:
+        return (
+            f"{percent(sigma)} of the patches land here, but they match poorly "
+            f"({s_bar:.2f}, at least {limits.tau_s:.2f} needed)"
+        )
+    if sigma < limits.tau_sigma:
+        return f"only {percent(sigma)} of the patches land here ({percent(limits.tau_sigma)} needed)"
+    if partner_id is not None:
+        return f"matches too ({percent(sigma)}, quality {s_bar:.2f}), but #{partner_id} fits better"
+    return (
+        f"matches by itself ({percent(sigma)}, quality {s_bar:.2f}), but belongs to another object or place"
+    )

@@ -1,0 +1,59 @@
+"""A result that is open for inspection: everything that all browsers share."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from oasisview.assets import AssetTable
+from oasisview.catalogue import Catalogue
+from oasisview.decisions import SharedDecisions
+from oasisview.scene.map_points import MapPoints, load_map_points
+from pipeline.result import Result
+
+
+class Workbench:
+    """Catalogue, map points and decisions of one result, and who is looking at it.
+
+    Construction reads the maps (seconds for large ones): keep it off the event loop.
+    """
+
+    def __init__(self, result: Result, assets: AssetTable) -> None:
+        self.result = result
+        self.catalogue = Catalogue(result, assets)
+        self.points: MapPoints = load_map_points(result)
+        self.decisions = SharedDecisions(result)
+        self.name = result.path.stem
+        self._present: dict[int, str] = {}
+        self._watchers: list[Callable[[], None]] = []
+        self._lock = threading.Lock()
+
+    def enter(self, client_id: int, user: str, watcher: Callable[[], None]) -> None:
+        """Somebody opened a page; ``watcher`` is told of everyone who comes and goes."""
+        with self._lock:
+            self._present[client_id] = user
+            self._watchers.append(watcher)
+        self._tell()
+
+    def leave(self, client_id: int, watcher: Callable[[], None]) -> None:
+        """Somebody closed a page."""
+        with self._lock:
+            self._present.pop(client_id, None)
+            if watcher in self._watchers:
+                self._watchers.remove(watcher)
+        self._tell()
+
+    def others(self, client_id: int) -> list[str]:
+        """Who else is looking, by name; one entry per page."""
+        with self._lock:
+            return sorted(name for client, name in self._present.items() if client != client_id)
+
+    def close(self) -> None:
+        """Let go of the files."""
+        self.decisions.close()
+
+    def _tell(self) -> None:
+        with self._lock:
+            watchers = tuple(self._watchers)
+        for watcher in watchers:
+            watcher()
