@@ -157,9 +157,7 @@ def _check(truth: LabelledPoints, session_count: int) -> None:
     if strange := codes - {int(label) for label in ChangeLabel} - {NOT_SCORED}:
         raise InputError(f"the ground truth holds the unknown label {min(strange)}", "labels are 0-4 and 255")
     if int(truth.object_id.min()) < 0:
-        raise InputError(
-            "the ground truth holds a negative object_id", "background is 0, objects 1, 2, ..."
-        )
+        raise InputError("the ground truth holds a negative object_id", "background is 0, objects 1, 2, ...")
     last = int(truth.session.max())
     if last >= session_count:
         raise InputError(
