@@ -23,6 +23,7 @@ Background points have object id 0. Patches are 16 px: grids of (15, 20).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -56,8 +57,13 @@ class _Visit:
     poses: list[NDArray[np.float64]]
     counterfactual: list[View]  # the other visit's scene from the same poses
 
+    @cached_property
+    def _all_points_world(self) -> list[NDArray[np.float32]]:
+        depths = [CAMERA.backproject(view.depth_m) for view in self.views]
+        return [transform_points(T, points) for T, points in zip(self.poses, depths, strict=True)]
+
     def points_world(self, k: int) -> NDArray[np.float32]:
-        return transform_points(self.poses[k], CAMERA.backproject(self.views[k].depth_m))
+        return self._all_points_world[k]
 
     def patch_ids(self, k: int) -> NDArray[np.uint16]:
         return self.views[k].object_ids[PATCH_PX // 2 :: PATCH_PX, PATCH_PX // 2 :: PATCH_PX].ravel()
@@ -65,14 +71,7 @@ class _Visit:
 
 def write_small_result(folder: Path, name: str = "small.oasis", key: str = "small-fixture") -> Path:
     """Write ``folder / name`` through ``ResultWriter`` and return its path; about a second."""
-    visits = [_visit(0), _visit(1)]
-    pairs = {
-        (j, k): _links(visits, j, k)
-        for j in range(KEYFRAMES)
-        for k in range(KEYFRAMES)
-        if _shared(visits, 0, j, k)
-    }
-    score_matrix = _score_matrix(visits, pairs)
+    visits, pairs, score_matrix = _scene()
     with ResultWriter(folder / name, key) as writer:
         for visit in visits:
             _write_visit(writer, visits, visit)
@@ -107,6 +106,18 @@ def write_small_result(folder: Path, name: str = "small.oasis", key: str = "smal
             }
         )
     return folder / name
+
+
+@cache
+def _scene() -> tuple[list[_Visit], dict[tuple[int, int], PatchLinks], ScoreMatrix]:
+    visits = [_visit(0), _visit(1)]
+    pairs = {
+        (j, k): _links(visits, j, k)
+        for j in range(KEYFRAMES)
+        for k in range(KEYFRAMES)
+        if _shared(visits, 0, j, k)
+    }
+    return visits, pairs, _score_matrix(visits, pairs)
 
 
 def _captured_at(session: int) -> str:
