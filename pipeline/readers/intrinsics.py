@@ -40,10 +40,14 @@ def number(values: Mapping[str, Any], key: str, where: str, default: float | Non
     """
     value = values.get(key, default)
     if value is None:
-        raise InputError(f"{where}: {key!r} is missing")
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{where}: {key!r} is {value!r}", "a finite number is expected")
-    return float(value)
+        raise InputError(f"{where}: {key!r} is missing", "a number is expected")
+    try:
+        converted = float(value) if isinstance(value, int | float) else math.nan
+    except OverflowError:
+        converted = math.inf
+    if isinstance(value, bool) or not math.isfinite(converted):
+        raise InputError(f"{where}: {key!r} is {value!r:.40}", "a finite number is expected")
+    return converted
 
 
 def checked_camera(camera: PinholeCamera, where: str) -> PinholeCamera:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from datetime import datetime
 from typing import Any
-
-import numpy as np
 
 from pipeline.camera import PinholeCamera
 from pipeline.errors import InputError
@@ -140,16 +139,19 @@ def parse_json(tree: FileTree, name: str) -> dict[str, Any]:
     Raises:
         InputError: not JSON (says where), or not an object.
     """
+    where, hint = tree.where(name), "export the archive again"
     try:
         document = json.loads(tree.read(name))
     except json.JSONDecodeError as error:
         raise InputError(
-            f"{tree.where(name)} is not valid JSON: {error.msg} in line {error.lineno}, column {error.colno}"
+            f"{where} is not valid JSON: {error.msg} in line {error.lineno}, column {error.colno}", hint
         ) from None
     except UnicodeDecodeError:
-        raise InputError(f"{tree.where(name)} is not text in UTF-8") from None
+        raise InputError(f"{where} is not text in UTF-8", hint) from None
+    except RecursionError:
+        raise InputError(f"{where} is nested too deeply", hint) from None
     if not isinstance(document, dict):
-        raise InputError(f"{tree.where(name)} does not hold a JSON object")
+        raise InputError(f"{where} does not hold a JSON object", hint)
     return document
 
 
@@ -184,9 +186,18 @@ def session_block(document: Mapping[str, Any], collector: FrameCollector) -> dic
             f"depth_source {about.pop('depth_source')!r} is unknown and read as 'sensor': "
             f"choose one of {', '.join(DEPTH_SOURCES)}"
         )
-    if not isinstance(about.get("captured_at", ""), str):
+    if "captured_at" in about and not is_iso_date(about["captured_at"]):
         collector.warn(f"captured_at {about.pop('captured_at')!r} is ignored: it is not an ISO 8601 date")
     return about
+
+
+def is_iso_date(value: Any) -> bool:
+    """Whether a value is a date, or a date and time, in ISO 8601."""
+    try:
+        datetime.fromisoformat(value)
+    except (TypeError, ValueError):
+        return False
+    return True
 
 
 def warn_about_resized_depth(images: StoredImages, collector: FrameCollector) -> None:
@@ -213,6 +224,7 @@ def point_cloud(document: Mapping[str, Any], collector: FrameCollector) -> tuple
 
 def timestamp_s(value: Any) -> float | None:
     """Seconds, or None for anything that is not a finite number."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+    try:
+        return number({"timestamp": value}, "timestamp", "")
+    except InputError:
         return None
-    return float(value)

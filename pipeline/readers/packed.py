@@ -131,6 +131,9 @@ class TarTree:
                         if member.offset_data + member.size > size:
                             raise _truncated(path)
                         self._members[name] = (member.offset_data, member.size)
+                # tarfile takes a cut header for the end; a whole archive ends with blocks of zeros.
+                if os.pread(file.fileno(), tarfile.BLOCKSIZE, archive.offset) != bytes(tarfile.BLOCKSIZE):
+                    raise _truncated(path)
         except (tarfile.TarError, EOFError, OSError, ValueError):
             raise _truncated(path) from None
         self._entries = _entries(self._members)

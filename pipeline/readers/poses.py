@@ -19,9 +19,11 @@ def checked_pose(matrix: Any) -> NDArray[np.float64]:
     Raises:
         InputError: what is wrong, as a clause that follows the frame's name.
     """
+    if matrix is None:
+        raise InputError("its pose is missing")
     try:
         T = np.array(matrix, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError("its pose is not a matrix of numbers") from None
     if T.shape == (3, 4):
         T = np.vstack([T, [0.0, 0.0, 0.0, 1.0]])
