@@ -59,14 +59,14 @@ def hud_html(mode: str, colours: str, layers: Layers, *, dark: bool) -> str:
         f'data-send="layer" data-key="{name}">{word}</label>'
         for name, word in LAYER_WORDS.items()
     )
-    theme = "Light page" if dark else "Dark page"
+    theme, sign = ("Light page", "\u2600") if dark else ("Dark page", "\u263e")
     return (
         '<div class="oa oa-hud">'
         f'<span class="oa-segments" role="group" aria-label="Map of which visit">{visits}</span>'
         f'<button {sends("overview")} title="See the whole site (H)">Overview</button>'
         '<details><summary title="What the map shows and how it is coloured">Layers</summary><div class="oa-popup">'
         f"<b>Colour of objects</b>{paints}<b>Show</b>{switches}</div></details>"
-        f'<button {sends("theme", not dark)} title="{theme}" aria-label="{theme}">{"\u2600" if dark else "\u263e"}</button>'
+        f'<button {sends("theme", not dark)} title="{theme}" aria-label="{theme}">{sign}</button>'
         f'<button data-open="help" title="Keys" aria-label="Keys">{key("?")}</button></div>'
     )
 
