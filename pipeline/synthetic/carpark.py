@@ -8,7 +8,7 @@ from pipeline.camera import PinholeCamera
 from pipeline.synthetic import goods, street, textures, vehicles
 from pipeline.synthetic.lighting import daylight
 from pipeline.synthetic.paths import walk
-from pipeline.synthetic.props import Arrangement, Prop, Workshop, fates
+from pipeline.synthetic.props import Arrangement, Prop, Workshop, fates, nudge
 from pipeline.synthetic.shapes import Mesh, box, join, pose
 from pipeline.synthetic.world import SensorSettings, SyntheticScene
 
@@ -79,7 +79,7 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
         if fate == "spare":
             continue
         goal = free.pop() if fate == "moved" and free else None
-        plan.deal(fate, car, T, goal, pose(*rng.normal(0, 0.06, 2), 0, rng.normal(0, 0.015)))
+        plan.deal(fate, car, T, goal, nudge(rng, 0.06, 0.015))
 
     edge = rows[2] + _BAY_DEPTH_M / 2 + 0.4
     for x in np.linspace(-half_length + 1, half_length - 1, shop.count(2, 4)):

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.camera import PinholeCamera, transform_points
 from pipeline.errors import InputError, StorageError
@@ -109,7 +110,7 @@ def record(
         captured_at = starts[visit].strftime("%Y-%m-%dT%H:%M:%SZ")
         name = f"{scene.name} {scene.seed}, visit {visit + 1}"
         archive = ArchiveWriter(folder / f"s{visit}", scene.camera, name, captured_at)
-        points = SeenPoints.none(scene.truth_voxel_m)
+        points = SeenPoints(scene.truth_voxel_m)
         reported = misplace(scene.paths[visit], sensor, rng)
         for index, T_world_camera in enumerate(scene.paths[visit]):
             view = renderers[visit].view(scene.camera, T_world_camera)
@@ -122,8 +123,8 @@ def record(
             points.add(transform_points(T_world_camera, in_camera), owner)
             report(ProgressEvent(_STAGE, visit * frames + index + 1, 2 * frames))
         archive.close()
-        seen.append(points)
-    truth = _label(scene, (seen[0], seen[1]), renderers, sensor)
+        seen.append(points.points())
+    truth = _label(scene, seen, renderers, sensor)
     write_ply(folder / "gt.ply", truth)
     (folder / "scene.json").write_text(json.dumps(describe(scene, truth), indent=1) + "\n")
     return truth
@@ -131,20 +132,19 @@ def record(
 
 def _label(
     scene: SyntheticScene,
-    seen: tuple[SeenPoints, SeenPoints],
+    seen: list[tuple[NDArray[np.float32], NDArray[np.int32]]],
     renderers: list[Renderer],
     sensor: SensorSettings,
 ) -> LabelledPoints:
     settings = TruthSettings()
-    partners: dict[int, set[int]] = {}
+    partners: dict[int, int] = {}
     for thing in scene.objects:
         if thing.replaced_by is not None:
-            partners[thing.object_id] = {thing.replaced_by}
-            partners[thing.replaced_by] = {thing.object_id}
+            partners[thing.object_id] = thing.replaced_by
+            partners[thing.replaced_by] = thing.object_id
     known = [
         observed(
-            seen[visit].points_world,
-            seen[visit].object_id,
+            *seen[visit],
             scene.camera,
             scene.paths[1 - visit],
             renderers[1 - visit].first_hit,
@@ -154,10 +154,11 @@ def _label(
         )
         for visit in (0, 1)
     ]
-    owners = (seen[0].object_id, seen[1].object_id)
+    owners = (seen[0][1], seen[1][1])
     static = {thing.object_id for thing in scene.objects if thing.fate == "static"}
     moved = {thing.object_id for thing in scene.objects if thing.is_moved}
-    return assemble(seen, label_points(owners, (known[0], known[1]), static, moved, settings))
+    labels = label_points(owners, (known[0], known[1]), static, moved, settings)
+    return assemble((seen[0][0], seen[1][0]), owners, labels)
 
 
 def describe(scene: SyntheticScene, truth: LabelledPoints) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from pipeline.synthetic import furniture, goods, prints, street, textures
 from pipeline.synthetic.carpark import OUTDOOR_SENSOR
 from pipeline.synthetic.lighting import daylight
 from pipeline.synthetic.paths import walk
-from pipeline.synthetic.props import Arrangement, Prop, Workshop, fates, scatter
+from pipeline.synthetic.props import Arrangement, Prop, Workshop, fates, nudge, scatter
 from pipeline.synthetic.shapes import Mesh, box, join, pose
 from pipeline.synthetic.world import SyntheticScene
 
@@ -39,9 +39,9 @@ def market_thing(shop: Workshop, colours: list) -> Prop:
     """Something that comes and goes with a market."""
     match int(shop.rng.integers(7)):
         case 0 | 1:
-            size = (shop.between(2.6, 4.0), shop.between(2.4, 3.2))
+            ground = (shop.between(2.3, 3.2), shop.between(2.2, 2.8))
             pair = [colours[int(i)] for i in shop.rng.choice(len(colours), 2, replace=False)]
-            return street.tent(shop, size, [shop.near(c, 12) for c in pair])
+            return street.tent(shop, ground, [shop.near(c, 12) for c in pair])
         case 2 | 3:
             return street.stall(shop, shop.between(1.6, 2.8))
         case 4:
@@ -59,20 +59,22 @@ def market_thing(shop: Workshop, colours: list) -> Prop:
 def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> SyntheticScene:
     """Draw a market square."""
     rng = shop.rng
-    width, depth = shop.between(25, 31), shop.between(21, 26)
+    width, depth = shop.between(29, 34), shop.between(25, 29)
     plan = Arrangement()
     colours = [prints.vivid(rng, 120, 235) for _ in range(4)] + [np.array([232.0, 228.0, 218.0])]
     lasting: list[Prop] = [street.fountain(shop, shop.between(1.4, 2.0))]
     lasting += [street.tree(shop, shop.between(3.6, 5.5)) for _ in range(shop.count(3, 6))]
     lasting += [street.lamppost(shop, shop.between(3.2, 4.2)) for _ in range(shop.count(3, 5))]
     lasting += [street.bench(shop, shop.between(1.6, 2.2)) for _ in range(shop.count(3, 5))]
-    passing = [market_thing(shop, colours) for _ in range(shop.count(22, 30))]
+    passing = [market_thing(shop, colours) for _ in range(shop.count(30, 40))]
     passing.sort(key=lambda prop: -prop.radius)
     # The camera walks round the square: the ring of its path stays free of things.
     inner = (width / 2 - 5.2, depth / 2 - 5.2)
-    everything = lasting[:1] + passing[:12] + lasting[1:] + passing[12:]
-    radii = [min(thing.radius, 1.2) if thing.class_name == "tree" else thing.radius for thing in everything]
-    places = scatter(rng, (-inner[0], -inner[1]), inner, radii, 0.25, 300)
+    everything = lasting[:1] + passing[:9] + lasting[1:] + passing[9:]
+    # Crowns overhang their neighbours; the corners of tents nearly touch.
+    room = {"tree": 0.55, "tent": 0.86, "stall": 0.9}
+    radii = [thing.radius * room.get(thing.class_name, 1.0) for thing in everything]
+    places = scatter(rng, (-inner[0], -inner[1]), inner, radii, 0.15, 800)
     spots: list[tuple[np.ndarray, Prop]] = []
     for thing, place in zip(everything, places, strict=True):
         if place is None:
@@ -93,7 +95,7 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
         if fate == "moved":
             fits = [i for i, (_, radius) in enumerate(free) if radius > thing.radius - 0.4]
             goal = free.pop(fits[0])[0] if fits else None
-        plan.deal(fate, thing, T, goal, pose(*rng.normal(0, 0.05, 2), 0, rng.normal(0, 0.03)))
+        plan.deal(fate, thing, T, goal, nudge(rng, 0.05, 0.03))
 
     return SyntheticScene(
         name="market",

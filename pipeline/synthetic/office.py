@@ -8,7 +8,7 @@ from pipeline.camera import PinholeCamera
 from pipeline.synthetic import furniture, prints, textures
 from pipeline.synthetic.lighting import room_lighting
 from pipeline.synthetic.paths import walk
-from pipeline.synthetic.props import Arrangement, Prop, Workshop, fates, scatter
+from pipeline.synthetic.props import Arrangement, Prop, Workshop, fates, nudge, scatter
 from pipeline.synthetic.shapes import Mesh, box, join, pose
 from pipeline.synthetic.world import SensorSettings, SyntheticScene
 
@@ -170,18 +170,14 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
     # On the floor, inside the ring of furniture.
     things = [floor_thing(shop) for _ in range(shop.count(9, 13))]
     inner = (width / 2 - 1.05, depth / 2 - 1.05)
-    table = float(np.hypot(w, d)) / 2
-    places = scatter(rng, (-inner[0], -inner[1]), inner, [table, *(t.radius for t in things)], 0.08, 200)
-    centre = np.array(places[0] or (0.0, 0.0))
-    standing = []
-    for thing, place in zip(things, places[1:], strict=True):
-        if place is None:
-            continue
-        # The first disc keeps the table's place free wherever it was drawn: shift it back onto the table.
-        at = np.array(place)
-        if np.hypot(*(at - middle[:2, 3])) < table * 0.8 + thing.radius and np.any(centre):
-            continue
-        standing.append((pose(at[0], at[1], 0, shop.between(-np.pi, np.pi)), thing, False))
+    table = (float(middle[0, 3]), float(middle[1, 3]), float(np.hypot(w, d)) / 2 * 0.85)
+    radii = [thing.radius for thing in things]
+    places = scatter(rng, (-inner[0], -inner[1]), inner, radii, 0.06, 200, taken=[table])
+    standing = [
+        (pose(place[0], place[1], 0, shop.between(-np.pi, np.pi)), thing, False)
+        for thing, place in zip(things, places, strict=True)
+        if place is not None
+    ]
     _deal_spots(plan, rng, standing, moved=0.2)
 
     paths = tuple(_round(shop, visit, width, depth, frames) for visit in (0, 1))
@@ -209,7 +205,7 @@ def _deal_spots(
         if fate == "spare":
             continue
         goal = free.pop() if fate == "moved" and free else None
-        plan.deal(fate, thing, T, goal, pose(*rng.normal(0, 0.006, 2), 0, rng.normal(0, 0.03)))
+        plan.deal(fate, thing, T, goal, nudge(rng, 0.006, 0.03))
 
 
 def _round(shop: Workshop, visit: int, width: float, depth: float, frames: int) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import string
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -109,7 +110,7 @@ def book_spines(rng: np.random.Generator, books: int = 1, size: int = 64) -> Til
     """The backs of ``books`` books side by side, with titles."""
     tile = np.zeros((size, size, 3), dtype=np.uint8)
     edges = np.linspace(0, size, books + 1).astype(int)
-    for left, right in zip(edges[:-1], edges[1:], strict=True):
+    for left, right in pairwise(edges):
         colour = vivid(rng)
         tile[:, left:right] = shaded(colour, noise(rng, size, 1.1)[:, left:right] * 0.08)
         for _ in range(int(rng.integers(2, 5))):

@@ -1,4 +1,4 @@
-"""What builders of objects share: where they draw from, what they return, what becomes of it between visits."""
+"""What builders of objects share: where they draw from, what they return, what becomes of it later."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.synthetic.atlas import TextureAtlas
-from pipeline.synthetic.shapes import Mesh
+from pipeline.synthetic.shapes import Mesh, pose
 from pipeline.synthetic.textures import Colour, Tile, mottled
 from pipeline.synthetic.world import Pose, SceneObject
 
@@ -139,35 +139,48 @@ class Arrangement:
 
 
 def fates(rng: np.random.Generator, count: int, **shares: float) -> list[str]:
-    """Shuffled fates of ``count`` things; each share is met to the nearest whole number, the rest is static."""
+    """Shuffled fates of ``count`` things; shares are met to whole numbers, the rest is static."""
     dealt = [name for name, share in shares.items() for _ in range(round(share * count))][:count]
     dealt += ["static"] * (count - len(dealt))
     return [dealt[i] for i in rng.permutation(count)]
 
 
+def nudge(rng: np.random.Generator, shift_m: float, turn_rad: float) -> Pose:
+    """How much what is put in a thing's place stands off it: shift and turn of these deviations, (4, 4)."""
+    dx, dy = rng.normal(0, shift_m, 2)
+    return pose(float(dx), float(dy), 0, float(rng.normal(0, turn_rad)))
+
+
 def scatter(
     rng: np.random.Generator,
-    low: Colour,
-    high: Colour,
+    low: tuple[float, float],
+    high: tuple[float, float],
     radii: Sequence[float],
     gap: float = 0.02,
     tries: int = 60,
+    taken: Sequence[tuple[float, float, float]] = (),
 ) -> list[tuple[float, float] | None]:
-    """Places in a rectangle where discs of the given radii do not touch; None where there was no room."""
-    placed: list[tuple[float, float, float]] = []
+    """Places in a rectangle where discs do not touch each other; None where there was no room.
+
+    Args:
+        rng: source of the places.
+        low: least x and y, metres.
+        high: greatest x and y, metres.
+        radii: of the discs, in the order in which they choose.
+        gap: least distance between discs, metres.
+        tries: places tried for each disc.
+        taken: x, y and radius of discs that stand there already.
+    """
+    discs = list(taken)
     places: list[tuple[float, float] | None] = []
     for radius in radii:
         found = None
-        for _ in range(tries):
-            x, y = (
-                float(rng.uniform(min(l + radius, h - radius), h - radius + 1e-6))
-                for l, h in zip(low, high, strict=True)
-            )
-            if x - radius < low[0] - 0.05 or y - radius < low[1] - 0.05:
-                break
-            if all(np.hypot(x - px, y - py) > radius + pr + gap for px, py, pr in placed):
+        free = [high[i] - low[i] - 2 * radius for i in (0, 1)]
+        for _ in range(tries if min(free) > -0.1 else 0):
+            x, y = (low[i] + radius + float(rng.random()) * max(free[i], 0.0) for i in (0, 1))
+            if all(np.hypot(x - dx, y - dy) > radius + other + gap for dx, dy, other in discs):
                 found = (x, y)
-                placed.append((x, y, radius))
+                discs.append((x, y, radius))
                 break
         places.append(found)
     return places

@@ -1,4 +1,4 @@
-"""What a real camera makes of a perfect view: exposure, grain and blur; noisy depth with holes; drifting poses."""
+"""What real cameras make of a perfect view: exposure, grain, blur; noisy depth with holes; pose errors."""
 
 from __future__ import annotations
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Vector = Sequence[float] | NDArray[np.float64]
+Vector = Sequence[float]
+Outline = Sequence[Sequence[float]]  # points (N, 2)
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ def box(
     return join(faces)
 
 
-def prism(outline: Vector, width: float, tile: int, metres: float = 1.0, taper: float = 1.0) -> Mesh:
+def prism(outline: Outline, width: float, tile: int, metres: float = 1.0, taper: float = 1.0) -> Mesh:
     """A convex outline in the x-z plane, extruded along y, centred on y = 0.
 
     Args:
@@ -138,7 +139,7 @@ def prism(outline: Vector, width: float, tile: int, metres: float = 1.0, taper: 
 
 
 def lathe(
-    profile: Vector,
+    profile: Outline,
     tile: int,
     metres: float | None = 1.0,
     segments: int = 20,
@@ -224,7 +225,7 @@ def sphere(
     """A sphere about the origin, its height scaled by ``flat``; ``bumps`` (9, 16) roughen it."""
     latitude = np.linspace(-np.pi / 2, np.pi / 2, 9)
     profile = np.stack([np.cos(latitude) * radius, np.sin(latitude) * radius * flat], axis=1)
-    return lathe(profile, tile, metres, 16, smooth=True, bumps=bumps)
+    return lathe(profile.tolist(), tile, metres, 16, smooth=True, bumps=bumps)
 
 
 def _plane_normal(corners: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -112,7 +112,7 @@ def rng_small(shop: Workshop) -> float:
 
 def parasol(shop: Workshop, radius: float) -> Prop:
     """A sunshade over a round table."""
-    colours = [prints.vivid(shop.rng, 100, 230), (232, 230, 222)]
+    colours: list[Colour] = [prints.vivid(shop.rng, 100, 230), (232, 230, 222)]
     cloth = shop.tile(textures.cloth(shop.rng, colours, 8))
     top = shop.tile(textures.wood(shop.rng, (156, 112, 70), 3))
     pole = shop.paint((200, 198, 190), 0.08)

@@ -6,6 +6,7 @@ Every function returns an (S, S, 3) uint8 sRGB tile. Colours are RGB triples in 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -55,7 +56,7 @@ def wood(rng: np.random.Generator, colour: Colour, planks: int = 3, size: int = 
     edges = np.linspace(0, size, planks + 1).astype(int)
     grain = noise(rng, size, 1.0, stretch=9.0)
     rings = noise(rng, size, 1.7, stretch=4.0)
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         shift = int(rng.integers(size))
         rows = np.roll(rings, shift, axis=1)[low:high]
         shade = 0.09 * np.sin(rows * rng.uniform(5, 9)) + 0.12 * np.roll(grain, shift, axis=1)[low:high]
@@ -80,7 +81,7 @@ def masonry(
         shift = (row % 2) * size // (2 * columns)
         xs = np.linspace(0, size, columns + 1).astype(int)
         for column in range(columns):
-            stone = np.asarray(colour, dtype=np.float32) * rng.normal(1.0, 0.13) * rng.normal(1, 0.035, 3)
+            stone = np.asarray(colour, dtype=np.float32) * rng.normal(1.0, 0.13) * rng.normal(1, 0.015, 3)
             at = (np.arange(xs[column] + joint, xs[column + 1]) + shift) % size
             block = slice(ys[row] + joint, ys[row + 1])
             tile[block, at] = stone * (1 + grain[block][:, at])[..., None]
@@ -93,11 +94,12 @@ def speckled(rng: np.random.Generator, colour: Colour, contrast: float = 0.25, s
     tile = shaded(colour, shade)
     for _ in range(int(rng.integers(2, 6))):
         walk = np.cumsum(rng.normal(0, 9, (14, 2)), axis=0) + rng.uniform(0, size, 2)
-        tone = [float(c) * rng.uniform(0.45, 0.7) for c in colour]
+        factor = rng.uniform(0.5, 0.75)
+        tone = [float(c) * factor for c in colour]
         cv2.polylines(tile, [walk.astype(np.int32)], False, tone, int(rng.integers(1, 3)), cv2.LINE_AA)
     for _ in range(int(rng.integers(3, 9))):
-        tone = [float(c) * rng.uniform(0.6, 1.25) for c in colour]
-        blot(rng, tile, tone)
+        factor = rng.uniform(0.65, 1.2)
+        blot(rng, tile, [float(c) * factor for c in colour])
     return tile
 
 

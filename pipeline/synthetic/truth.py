@@ -40,34 +40,34 @@ class TruthSettings:
     tolerance_per_m: float = 0.005
 
 
-@dataclass
 class SeenPoints:
-    """Points that one visit saw, thinned to one per voxel and object.
+    """Points that one visit saw, thinned to one per voxel and object; what was seen first stays."""
 
-    Attributes:
-        voxel_m: edge of a voxel, metres.
-        points_world: (N, 3) float32, exactly on the surfaces.
-        object_id: (N,) int32, 0 = background.
-    """
-
-    voxel_m: float
-    points_world: NDArray[np.float32]
-    object_id: NDArray[np.int32]
-
-    @classmethod
-    def none(cls, voxel_m: float) -> SeenPoints:
-        """Nothing seen yet."""
-        return cls(voxel_m, np.zeros((0, 3), dtype=np.float32), np.zeros(0, dtype=np.int32))
+    def __init__(self, voxel_m: float) -> None:
+        self._voxel_m = voxel_m
+        self._points = [np.zeros((0, 3), dtype=np.float32)]
+        self._owners = [np.zeros(0, dtype=np.int32)]
 
     def add(self, points_world: NDArray[np.float32], object_id: NDArray[np.int32]) -> None:
-        """Add what a keyframe saw; what was there first stays."""
-        points = np.concatenate([self.points_world, points_world])
-        owners = np.concatenate([self.object_id, object_id])
-        cells = np.floor(points / self.voxel_m).astype(np.int64) + (1 << 15)
+        """Add what a keyframe saw: (N, 3) metres, exactly on the surfaces, and (N,) their objects."""
+        points, owners = self._thinned(points_world, object_id)
+        self._points.append(points)
+        self._owners.append(owners)
+
+    def points(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """All points of the visit, (N, 3) metres, and their objects, (N,), 0 = background."""
+        points, owners = self._thinned(np.concatenate(self._points), np.concatenate(self._owners))
+        self._points, self._owners = [points], [owners]
+        return points, owners
+
+    def _thinned(
+        self, points: NDArray[np.float32], owners: NDArray[np.int32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        cells = np.floor(points / self._voxel_m).astype(np.int64) + (1 << 15)
         key = cells[:, 0] << 48 ^ cells[:, 1] << 32 ^ cells[:, 2] << 16 ^ owners
         _, first = np.unique(key, return_index=True)
         first.sort()
-        self.points_world, self.object_id = points[first], owners[first]
+        return points[first], owners[first]
 
 
 def observed(
@@ -77,7 +77,7 @@ def observed(
     path: NDArray[np.float64],
     first_hit: FirstHit,
     max_range_m: float,
-    partners: dict[int, set[int]],
+    partners: dict[int, int],
     settings: TruthSettings,
 ) -> NDArray[np.bool_]:
     """Whether the place of each point was observed by another visit: seen, or seen through.
@@ -89,11 +89,16 @@ def observed(
         path: true T_world_camera of the other visit, (frames, 4, 4).
         first_hit: casts rays into the world of the other visit.
         max_range_m: farther away nothing is measured.
-        partners: for an object, those that stand in its place in the other visit: to see them is to
-            observe the place, although they hide the very point.
+        partners: for an object, the one that stands in its place in the other visit: to see that is to
+            observe the place, although it hides the very point.
         settings: tolerances.
     """
     known = np.zeros(len(points_world), dtype=bool)
+    successor = np.zeros(int(object_id.max(initial=0)) + 1, dtype=np.int32)
+    for number, other in partners.items():
+        if number < len(successor):
+            successor[number] = other
+    partner = successor[object_id]
     for T_world_camera in path:
         open_points = np.flatnonzero(~known)
         if not len(open_points):
@@ -112,8 +117,7 @@ def observed(
         distance = np.linalg.norm(points_world[candidates] - centre, axis=1)
         tolerance = settings.tolerance_m + settings.tolerance_per_m * distance
         free = share * distance >= distance - tolerance
-        hidden = np.flatnonzero(~free & (owner > 0))
-        free[hidden] = [int(owner[i]) in partners.get(int(object_id[candidates[i]]), ()) for i in hidden]
+        free |= (owner > 0) & (owner == partner[candidates])
         known[candidates[free]] = True
     return known
 
@@ -161,7 +165,9 @@ def label_points(
 
 
 def assemble(
-    seen: tuple[SeenPoints, SeenPoints], labels: tuple[NDArray[np.uint8], NDArray[np.uint8]]
+    points_world: tuple[NDArray[np.float32], NDArray[np.float32]],
+    object_id: tuple[NDArray[np.int32], NDArray[np.int32]],
+    labels: tuple[NDArray[np.uint8], NDArray[np.uint8]],
 ) -> LabelledPoints:
     """One cloud of both visits, coloured by label."""
     label = np.concatenate(labels)
@@ -169,10 +175,10 @@ def assemble(
     for code, colour in COLOURS.items():
         colours[code] = colour
     return LabelledPoints(
-        points_world=np.concatenate([points.points_world for points in seen]),
+        points_world=np.concatenate(points_world),
         colours=colours[label],
-        session=np.repeat(np.array([0, 1], dtype=np.uint8), [len(points.object_id) for points in seen]),
+        session=np.repeat(np.array([0, 1], dtype=np.uint8), [len(ids) for ids in object_id]),
         label=label,
-        object_id=np.concatenate([points.object_id for points in seen]),
+        object_id=np.concatenate(object_id),
         confidence=np.ones(len(label), dtype=np.float32),
     )

@@ -98,7 +98,7 @@ def _bodywork(shop: Workshop, paint: Colour) -> np.ndarray:
 def _windows(
     house: list[tuple[float, float]], width: float, glass: int, waist: float, height: float
 ) -> list[Mesh]:
-    """Slightly raised panes on the four sides of a cabin outline (rear foot, front foot, front top, rear top)."""
+    """Slightly raised panes on the four sides of a cabin (rear foot, front foot, front top, rear top)."""
     (rear_x, _), (front_x, _), (top_front, _), (top_rear, _) = house
 
     def level(z: float, share: float) -> tuple[float, float]:

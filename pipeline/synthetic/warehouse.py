@@ -8,7 +8,7 @@ from pipeline.camera import PinholeCamera
 from pipeline.synthetic import furniture, goods, prints, textures
 from pipeline.synthetic.lighting import room_lighting
 from pipeline.synthetic.paths import walk
-from pipeline.synthetic.props import Arrangement, Prop, Workshop, fates, scatter
+from pipeline.synthetic.props import Arrangement, Prop, Workshop, fates, nudge, scatter
 from pipeline.synthetic.shapes import Mesh, box, join, pose
 from pipeline.synthetic.world import SensorSettings, SyntheticScene
 
@@ -95,10 +95,10 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
                     half = float(thing.mesh.bounds[1, 0])
                     if x + 2 * half > bay / 2 - 0.12:
                         break
-                    if rng.random() < 0.84:
+                    if rng.random() < 0.93:
                         yaw, y = rng.normal(0, 0.07), shop.between(-0.14, 0.06)
                         spots.append((centre @ pose(x + half, y, z, yaw), thing))
-                    x += 2 * half + shop.between(0.07, 0.3)
+                    x += 2 * half + shop.between(0.05, 0.2)
     _deal(plan, rng, spots)
 
     # Pallets, stacks, drums and trucks on the floor at the end of the aisle.
@@ -154,7 +154,7 @@ def _deal(
         if fate == "spare":
             continue
         goal = free.pop() if fate == "moved" and free else None
-        plan.deal(fate, thing, T, goal, pose(*rng.normal(0, 0.008, 2), 0, rng.normal(0, 0.03)))
+        plan.deal(fate, thing, T, goal, nudge(rng, 0.008, 0.03))
 
 
 def _patrol(shop: Workshop, visit: int, length: float, aisle: float, frames: int) -> np.ndarray:
