@@ -101,7 +101,9 @@ class DiscoverySettings:
     structure_rounds: int = setting(14, "planes tried as walls, floors and ceilings")
     structure_hypotheses: int = setting(150, "random planes per round")
     wall_area_m2: float = setting(2.0, "least area of a wall at 2 cm voxels; grows with the voxel", unit="m2")
-    level_area_m2: float = setting(1.0, "least area of a floor at 2 cm voxels; grows with the voxel", unit="m2")
+    level_area_m2: float = setting(
+        1.0, "least area of a floor at 2 cm voxels; grows with the voxel", unit="m2"
+    )
     wall_hidden: float = setting(0.05, "a wall has less than this share of voxels behind it")
     level_hidden: float = setting(0.02, "a floor or ceiling has less than this share of voxels behind it")
     raised_border: float = setting(0.3, "a floor drops off along less than this share of its border")
@@ -169,6 +171,19 @@ class ChangeSettings:
     rule: Literal["evidence", "paper"] = setting(
         "evidence", "evidence = the place itself must have changed; paper = Eq. 8 alone"
     )
+    bias: float = setting(-5.3, "log odds of a change before any evidence")
+    seen_through_weight: float = setting(12.9, "log odds for a place that was seen to be empty")
+    residual_weight: float = setting(1.85, "log odds per unit of median colour residual")
+    tail_weight: float = setting(7.0, "log odds for a surface whose colours no lighting explains")
+    texture_weight: float = setting(4.1, "log odds for a printed surface whose print differs")
+    reliable_appearance_scale: float = setting(
+        0.08, "colour spread between the visits up to which appearance counts fully", unit="log units"
+    )
+    min_compared_voxels: int = setting(8, "voxels that must be compared before appearance counts")
+    vacated_share: float = setting(0.4, "a move leaves a place, and takes one, seen to be empty this much")
+    same_place_overlap: float = setting(0.1, "overlap from which two unchanged objects are one")
+    moved_size_ratio: float = setting(2.0, "a moved object keeps its size within this factor")
+    replaced_overlap: float = setting(0.25, "share of the smaller bounds that a replacement has in common")
     tau_d_m: float = setting(0.1, "objects displaced by more than this have moved", unit="m", symbol="tau_d")
     nu_min: float = setting(0.5, "least coverage of a decision", symbol="nu_min")
 

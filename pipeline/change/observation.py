@@ -6,8 +6,9 @@ and as neither when something stood in front of it: occluded is not observed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -94,8 +95,8 @@ def glimpse(
     ray = points[kept] / np.maximum(np.linalg.norm(points[kept], axis=1, keepdims=True), 1e-9)
     facing = -np.einsum("vc,vc->v", ray, surface.normals_world[voxels])
     cosine = np.clip(np.abs(facing), 0.2, 1.0)
-    tolerance = max(settings.tolerance_voxels * surface.voxel_size_m, settings.tolerance_m)
-    tolerance = tolerance + settings.tolerance_per_metre * depth
+    least_m = max(settings.tolerance_voxels * surface.voxel_size_m, settings.tolerance_m)
+    tolerance = least_m + settings.tolerance_per_metre * depth
 
     behind = window.complete_nearest[row, column]
     is_free = (behind > 0) & ((behind - depth) * cosine > tolerance)
@@ -150,6 +151,25 @@ class Observation:
         self._colour_sum[seen.colour_voxels] += seen.log_colours
         self._colour_count[seen.colour_voxels] += 1
 
+    def to_sparse(self) -> dict[str, NDArray[np.generic]]:
+        """The entries of the voxels that were observed, as plain arrays."""
+        voxels = np.flatnonzero((self.free_count > 0) | (self.hit_count > 0) | (self._colour_count > 0))
+        return {
+            "voxels": voxels.astype(np.int32),
+            "free_count": self.free_count[voxels],
+            "hit_count": self.hit_count[voxels],
+            "colour_sum": self._colour_sum[voxels],
+            "colour_count": self._colour_count[voxels],
+        }
+
+    def add_sparse(self, entries: Mapping[str, NDArray[Any]]) -> None:
+        """Add what ``to_sparse`` gave."""
+        voxels = entries["voxels"]
+        self.free_count[voxels] += entries["free_count"]
+        self.hit_count[voxels] += entries["hit_count"]
+        self._colour_sum[voxels] += entries["colour_sum"]
+        self._colour_count[voxels] += entries["colour_count"]
+
     @property
     def is_observed(self) -> NDArray[np.bool_]:
         """(M,) whether any keyframe saw the voxel or through it."""
@@ -163,7 +183,7 @@ class Observation:
     @property
     def log_colours(self) -> NDArray[np.float32]:
         """(M, 3) the other visit's mean log RGB; zeros where ``has_colour`` is false."""
-        return self._colour_sum / np.maximum(self._colour_count, 1)[:, None]
+        return self._colour_sum / np.maximum(self._colour_count, 1).astype(np.float32)[:, None]
 
     def is_seen_through(self, settings: ObservationSettings) -> NDArray[np.bool_]:
         """(M,) whether the voxel is empty in the other visit: mostly free, and not by one stray pixel."""

@@ -82,6 +82,15 @@ class SessionGeometry:
         return self.keyframes[k].camera.strided(self.stride)
 
 
+def reopen_stores(
+    folder: Path, voxel_size_m: float, settings: Settings
+) -> tuple[KeyframeStore, SubmapSurfaces]:
+    """The stores of per-keyframe arrays and submaps in a folder."""
+    max_depth_m = min(settings.image.max_depth_m, MAX_STORED_DEPTH_M)
+    grid = TsdfGrid(voxel_size_m, settings.surface.truncation_voxels, max_depth_m)
+    return KeyframeStore(folder), SubmapSurfaces(folder, grid)
+
+
 @dataclass(frozen=True)
 class KeyframeSinks:
     """Where the lasting products of each keyframe go, by the archive's frame number."""

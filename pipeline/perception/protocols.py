@@ -5,6 +5,7 @@ A backend is one new file that implements a protocol and is named in ``pipeline.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -50,38 +51,57 @@ class FeatureExtractor(Protocol):
     def describe(self, rgb: NDArray[np.uint8]) -> NDArray[np.float16]:
         """What is stored for an image: (H_f, W_f, c) float16, row-major patches over the whole image."""
 
+    def light(
+        self, previous: NDArray[np.float16], current: NDArray[np.float16], warp: PatchWarp
+    ) -> NDArray[np.float64]:
+        """How the light differs between two stored maps that see the same place.
+
+        Only the extractor that made it reads it; lights of several pairs may be averaged. Features that
+        do not mind the light return an empty array.
+        """
+
     def comparable(
         self,
         previous: NDArray[np.float16],
         current: NDArray[np.float16],
-        warp: PatchWarp | None,
+        light: NDArray[np.float64] | None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """F0 and F1 of a pair of stored maps: (N0, d) and (N1, d) unit rows, so that C = F0 F1^T.
+        """F0 and F1: unit rows, so that C = F0 F1^T.
 
         Args:
-            previous, current: stored maps of ``describe``.
-            warp: rough alignment of the pair, for lighting compensation; None compares as they are.
+            previous, current: (..., c) stored patches, whole maps or any selection of patches.
+            light: from ``light``; None compares the patches as they are.
+
+        Returns:
+            (N0, d) and (N1, d) float32, patches in row-major order.
         """
 
 
 class MaskGenerator(Protocol):
-    """Instance masks per keyframe (paper: SAM2)."""
+    """Instance masks per keyframe (paper: SAM2).
+
+    ``masks_are_tracks`` says that a mask number means the same object in every keyframe of a visit, so that
+    nothing has to be merged.
+    """
 
     name: str
     weights_hash: str | None
+    masks_are_tracks: bool
 
     def prepare(self, surface: FusedSurface) -> None:
         """Called once per visit before any mask is asked for."""
 
-    def masks(self, rgb: NDArray[np.uint8], voxels: NDArray[np.int32]) -> NDArray[np.int32]:
+    def masks(
+        self, load_rgb: Callable[[], NDArray[np.uint8]], voxels: NDArray[np.int32]
+    ) -> NDArray[np.int32]:
         """Masks of one keyframe.
 
         Args:
-            rgb: (H, W, 3) at processing size.
+            load_rgb: gives (H, W, 3) at processing size; geometry alone needs no decoding.
             voxels: (h, w) number of the surface voxel of every strided pixel, -1 = none.
 
         Returns:
-            (h, w) mask number of every strided pixel, 0 = none; numbers mean nothing across keyframes.
+            (h, w) mask number of every strided pixel, 0 = none.
         """
 
 

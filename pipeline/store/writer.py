@@ -102,6 +102,11 @@ class ResultWriter:
 
     # Stages and scratch
 
+    @property
+    def work(self) -> Path:
+        """Folder for intermediate files of any kind; gone after ``finish``."""
+        return self._work
+
     def _marker(self, stage: str) -> Path:
         return self._work / "stages" / f"{stage}.json"
 
@@ -153,6 +158,12 @@ class ResultWriter:
     def write_features(self, session: int, frame_index: int, features: NDArray[np.floating]) -> None:
         """Patch features of a keyframe, stored as float16 in the shape given."""
         write_array(self.layout.features(session, frame_index), features.astype(np.float16))
+
+    def read_image(self, session: int, frame_index: int) -> NDArray[np.uint8]:
+        """(H, W, 3) RGB image that ``write_image`` stored."""
+        import cv2
+
+        return cv2.cvtColor(cv2.imread(str(self.layout.image(session, frame_index))), cv2.COLOR_BGR2RGB)
 
     def read_features(self, session: int, frame_index: int) -> NDArray[np.float16]:
         """Features that ``write_features`` stored, memory-mapped read-only."""

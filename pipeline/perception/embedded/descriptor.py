@@ -47,34 +47,36 @@ class GradientColourDescriptor:
         histogram = _gradient_histograms(cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY), grid)
         return np.concatenate([colour, histogram], axis=-1).astype(np.float16)
 
+    def light(
+        self, previous: NDArray[np.float16], current: NDArray[np.float16], warp: PatchWarp
+    ) -> NDArray[np.float64]:
+        """Per-channel log gain, (3,)."""
+        colours = [stored[..., :COLOUR_CHANNELS].astype(np.float32) for stored in (previous, current)]
+        return log_gain(colours[0], colours[1], warp)
+
     def comparable(
         self,
         previous: NDArray[np.float16],
         current: NDArray[np.float16],
-        warp: PatchWarp | None,
+        light: NDArray[np.float64] | None,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """F0 (N0, 168) and F1 (N1, 168), the current colours brought to the previous visit's light."""
-        previous32, current32 = previous.astype(np.float32), current.astype(np.float32)
-        colour0, colour1 = previous32[..., :COLOUR_CHANNELS], current32[..., :COLOUR_CHANNELS]
-        if warp is not None:
-            colour1 = colour1 * np.exp(log_gain(colour0, colour1, warp)).astype(np.float32)
-        return (
-            self._unit_vectors(colour0, previous32[..., COLOUR_CHANNELS:]),
-            self._unit_vectors(colour1, current32[..., COLOUR_CHANNELS:]),
-        )
+        gain = np.ones(COLOUR_CHANNELS) if light is None else np.exp(light)
+        return self._unit_vectors(previous, np.ones(COLOUR_CHANNELS)), self._unit_vectors(current, gain)
 
     def _unit_vectors(
-        self, colour_bgr: NDArray[np.float32], histogram: NDArray[np.float32]
+        self, stored: NDArray[np.float16], gain: NDArray[np.float64]
     ) -> NDArray[np.float32]:
-        lab = cv2.cvtColor(np.clip(colour_bgr / 255.0, 0, 1).reshape(-1, 1, 3), cv2.COLOR_BGR2Lab)[:, 0]
+        patches = stored.reshape(-1, stored.shape[-1]).astype(np.float32)
+        colour = np.clip(patches[:, :COLOUR_CHANNELS] * gain.astype(np.float32) / 255.0, 0, 1)
+        lab = cv2.cvtColor(colour[:, None].astype(np.float32), cv2.COLOR_BGR2Lab)[:, 0]
         weighted = lab * np.array([self._settings.lightness_weight, 1, 1], np.float32)
-        phase = (weighted / self._settings.colour_sigma_lab) @ self._frequencies
+        phase = (weighted / np.float32(self._settings.colour_sigma_lab)) @ self._frequencies
         lifted = np.concatenate([np.cos(phase), np.sin(phase)], axis=1)
         lifted /= np.sqrt(np.float32(self._settings.random_features))
-        share = self._settings.colour_weight
-        flat = histogram.reshape(len(lifted), -1)
-        # A patch without any gradient keeps a short histogram part: blank matches blank by colour alone.
-        return np.concatenate([np.sqrt(share) * lifted, np.sqrt(1 - share) * flat], axis=1).astype(np.float32)
+        share = np.float32(self._settings.colour_weight)
+        histogram = patches[:, COLOUR_CHANNELS:]
+        return np.concatenate([np.sqrt(share) * lifted, np.sqrt(1 - share) * histogram], axis=1)
 
 
 def log_gain(

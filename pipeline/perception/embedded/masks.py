@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,7 @@ class DiscoveredMasks:
 
     name = "embedded"
     weights_hash: str | None = None
+    masks_are_tracks = True
 
     def __init__(self, settings: DiscoverySettings) -> None:
         self._settings = settings
@@ -25,7 +28,9 @@ class DiscoveredMasks:
 
         self._segments = discover_objects(surface, self._settings)
 
-    def masks(self, rgb: NDArray[np.uint8], voxels: NDArray[np.int32]) -> NDArray[np.int32]:
+    def masks(
+        self, load_rgb: Callable[[], NDArray[np.uint8]], voxels: NDArray[np.int32]
+    ) -> NDArray[np.int32]:
         """(h, w) segment of every strided pixel, 0 = none."""
         if not len(self._segments):
             return np.zeros(voxels.shape, np.int32)

@@ -1,0 +1,229 @@
+"""Which objects of the two visits are one, and what became of each.
+
+Two rules share the evidence. ``paper``: the association alone decides (Eq. 8). ``evidence``: what changed is
+decided at each place (``change_score``); objects that stayed keep their identity by place, objects that
+left are looked for elsewhere by their patches, and only what left and was not found has disappeared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from pipeline.association.accumulation import AccumulatedAssociation
+from pipeline.association.reassociation import FoundAgain
+from pipeline.change.evidence import ObjectEvidence
+from pipeline.change.labels import labels_from_association
+from pipeline.result import ChangeLabel
+from pipeline.settings import ChangeSettings
+
+# Label code of an object that nobody has seen yet.
+NOT_MET = 255
+
+
+@dataclass(frozen=True)
+class VisitEvidence:
+    """What speaks about the objects of one visit; arrays are (K + 1,), entry 0 is background.
+
+    Attributes:
+        objects: coverage, seen-through share, appearance.
+        log_odds: of a change at the object's place.
+        is_met: the object has been seen by now (all of them in a finished visit).
+    """
+
+    objects: ObjectEvidence
+    log_odds: NDArray[np.float64]
+    is_met: NDArray[np.bool_]
+
+    @property
+    def count(self) -> int:
+        """K, the number of instances."""
+        return len(self.log_odds) - 1
+
+
+@dataclass(frozen=True)
+class Identity:
+    """A previous and a current instance (counted from 1) that are one object, and how sure that is."""
+
+    previous: int
+    current: int
+    confidence: float
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Labels and identities at one moment; arrays are (K + 1,), entry 0 is background.
+
+    Attributes:
+        identities: objects of both visits.
+        labels0, labels1: ``ChangeLabel`` codes per instance, ``NOT_MET`` before it was seen.
+        confidence0, confidence1: of the labels, in [0, 1].
+    """
+
+    identities: tuple[Identity, ...]
+    labels0: NDArray[np.int64]
+    labels1: NDArray[np.int64]
+    confidence0: NDArray[np.float64]
+    confidence1: NDArray[np.float64]
+
+
+# Looks for vacated previous instances among vacated current ones (both counted from 1).
+FindAgain = Callable[[list[int], list[int]], list[FoundAgain]]
+
+
+def decide_by_association(
+    previous: VisitEvidence,
+    current: VisitEvidence,
+    association: AccumulatedAssociation,
+    settings: ChangeSettings,
+    *,
+    is_final: bool,
+) -> Decision:
+    """The paper's rule, Eq. 8; before the last submap, case 2 is deferred and stays unknown."""
+    pairs = association.pairs()
+    labels0, labels1 = labels_from_association(
+        pairs,
+        previous.objects.centroid_world[1:],
+        current.objects.centroid_world[1:],
+        previous.objects.coverage[1:],
+        current.objects.coverage[1:],
+        settings.tau_d_m,
+        settings.nu_min,
+    )
+    if not is_final:
+        taken = ({current for _, current in pairs}, {previous for previous, _ in pairs})
+        for axis, labels in enumerate((labels0, labels1)):
+            unmatched = np.isin(labels, (ChangeLabel.APPEARED, ChangeLabel.DISAPPEARED))
+            for instance in np.flatnonzero(unmatched):
+                if association.is_deferred(axis, int(instance), taken[axis]):
+                    labels[instance] = ChangeLabel.UNKNOWN
+    evidence = association.evidence
+    identities = tuple(
+        Identity(row + 1, column + 1, float(evidence.s_bar[row, column])) for row, column in pairs
+    )
+    full0, full1 = np.concatenate([[0], labels0]), np.concatenate([[0], labels1])
+    confidence = [
+        np.where(full == ChangeLabel.UNKNOWN, 0.5, visit.objects.coverage).astype(float)
+        for full, visit in ((full0, previous), (full1, current))
+    ]
+    for identity in identities:
+        confidence[0][identity.previous] = confidence[1][identity.current] = identity.confidence
+    return _finished(identities, (previous, current), (full0, full1), (confidence[0], confidence[1]))
+
+
+def decide_by_evidence(
+    previous: VisitEvidence,
+    current: VisitEvidence,
+    overlap: NDArray[np.float64],
+    association: AccumulatedAssociation,
+    find_again: FindAgain,
+    settings: ChangeSettings,
+) -> Decision:
+    """Decide from what changed at each place.
+
+    Args:
+        previous, current: evidence of either visit.
+        overlap: (n, m) voxel intersection over union of the objects' places.
+        association: the paper's association, for objects that both left their place.
+        find_again: re-association of what neither place nor association explains.
+    """
+    visits = (previous, current)
+    changed = [(visit.log_odds > 0) & visit.is_met for visit in visits]
+    labels = [
+        np.where(visit.objects.coverage >= settings.nu_min, ChangeLabel.STATIC, ChangeLabel.UNKNOWN)
+        for visit in visits
+    ]
+    for visit, code in enumerate((ChangeLabel.DISAPPEARED, ChangeLabel.APPEARED)):
+        is_covered = visits[visit].objects.coverage >= settings.nu_min
+        labels[visit][changed[visit] & is_covered] = code
+    confidence = [_confidence(visit, settings) for visit in visits]
+
+    identities = _same_place(changed, overlap, previous, current, settings)
+    for identity in identities:
+        labels[0][identity.previous] = labels[1][identity.current] = ChangeLabel.STATIC
+    moved = _moves(changed, previous, current, association, find_again, settings)
+    for identity in moved:
+        labels[0][identity.previous] = labels[1][identity.current] = ChangeLabel.MOVED
+        confidence[0][identity.previous] = confidence[1][identity.current] = identity.confidence
+    return _finished((*identities, *moved), visits, (labels[0], labels[1]), (confidence[0], confidence[1]))
+
+
+def _same_place(
+    changed: list[NDArray[np.bool_]],
+    overlap: NDArray[np.float64],
+    previous: VisitEvidence,
+    current: VisitEvidence,
+    settings: ChangeSettings,
+) -> tuple[Identity, ...]:
+    """One-to-one identities of unchanged objects by the place they share."""
+    stayed = [np.flatnonzero(~c & v.is_met)[1:] for c, v in zip(changed, (previous, current), strict=True)]
+    if not len(stayed[0]) or not len(stayed[1]):
+        return ()
+    shared = overlap[np.ix_(stayed[0] - 1, stayed[1] - 1)]
+    rows, columns = linear_sum_assignment(-shared)
+    return tuple(
+        Identity(int(stayed[0][row]), int(stayed[1][column]), float(shared[row, column]))
+        for row, column in zip(rows, columns, strict=True)
+        if shared[row, column] > settings.same_place_overlap
+    )
+
+
+def _moves(
+    changed: list[NDArray[np.bool_]],
+    previous: VisitEvidence,
+    current: VisitEvidence,
+    association: AccumulatedAssociation,
+    find_again: FindAgain,
+    settings: ChangeSettings,
+) -> tuple[Identity, ...]:
+    """Objects that left one place and took another: both places were seen to be empty in the other visit."""
+    vacated = [
+        set(np.flatnonzero(c & (v.objects.seen_through >= settings.vacated_share)).tolist())
+        for c, v in zip(changed, (previous, current), strict=True)
+    ]
+
+    def displacement_m(previous_instance: int, current_instance: int) -> float:
+        before = previous.objects.centroid_world[previous_instance]
+        return float(np.linalg.norm(current.objects.centroid_world[current_instance] - before))
+
+    moves = [
+        Identity(row + 1, column + 1, float(association.evidence.s_bar[row, column]))
+        for row, column in association.pairs()
+        if row + 1 in vacated[0] and column + 1 in vacated[1]
+    ]
+    left = sorted(vacated[0] - {move.previous for move in moves})
+    taken = sorted(vacated[1] - {move.current for move in moves})
+    if left and taken:
+        moves += [
+            Identity(found.previous, found.current, found.sigma * found.s_bar)
+            for found in find_again(left, taken)
+        ]
+    return tuple(m for m in moves if displacement_m(m.previous, m.current) > settings.tau_d_m)
+
+
+def _confidence(visit: VisitEvidence, settings: ChangeSettings) -> NDArray[np.float64]:
+    """Confidence of changed or not changed, less where little of the object was observed."""
+    decided = 1.0 / (1.0 + np.exp(-np.clip(np.abs(visit.log_odds), 0, 30)))
+    covered = visit.objects.coverage >= settings.nu_min
+    observed = 0.5 + 0.5 * np.minimum(1.0, visit.objects.coverage)
+    # An unknown object is the surer unknown the less of it was observed.
+    unknown = 1.0 - visit.objects.coverage
+    return np.where(covered, 0.5 + (decided - 0.5) * observed, unknown)
+
+
+def _finished(
+    identities: tuple[Identity, ...],
+    visits: tuple[VisitEvidence, VisitEvidence],
+    labels: tuple[NDArray[np.integer], NDArray[np.integer]],
+    confidences: tuple[NDArray[np.float64], NDArray[np.float64]],
+) -> Decision:
+    """A decision that leaves out what was not met, and whose background is static for certain."""
+    codes = [np.where(v.is_met, c, NOT_MET).astype(np.int64) for v, c in zip(visits, labels, strict=True)]
+    values = [confidence.copy() for confidence in confidences]
+    for visit in range(2):
+        codes[visit][0], values[visit][0] = ChangeLabel.STATIC, 1.0
+    return Decision(identities, codes[0], codes[1], values[0], values[1])

@@ -1,0 +1,59 @@
+"""Stage "observe": what each visit saw of the other's surface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.change.observation import Observation, glimpses
+from pipeline.mapping.front_end import SessionGeometry
+from pipeline.settings import Settings
+
+
+@dataclass(frozen=True)
+class MutualObservation:
+    """Observations of both surfaces.
+
+    Attributes:
+        of_current: the current surface, seen by the whole previous visit.
+        of_previous: the previous surface, seen by the whole current visit.
+        by_submap: (submaps of the current visit) what each submap alone saw of the previous surface, as
+            sparse arrays: they are replayed to say what was believed when.
+    """
+
+    of_current: Observation
+    of_previous: Observation
+    by_submap: tuple[dict[str, NDArray[np.generic]], ...]
+
+
+def observe(
+    previous: SessionGeometry,
+    current: SessionGeometry,
+    settings: Settings,
+    on_keyframe: Callable[[int], None],
+) -> MutualObservation:
+    """Let every keyframe of either visit look at the surface of the other."""
+    done = 0
+    of_current = Observation(len(current.surface.points_world))
+    for seen in glimpses(current, previous, settings.observation, settings.image.max_depth_m):
+        of_current.add(seen)
+        done += 1
+        on_keyframe(done)
+    voxel_count = len(previous.surface.points_world)
+    of_previous, submap_view = Observation(voxel_count), Observation(voxel_count)
+    by_submap: list[dict[str, NDArray[np.generic]]] = []
+    views = glimpses(previous, current, settings.observation, settings.image.max_depth_m)
+    for k, seen in enumerate(views):
+        submap_view.add(seen)
+        done += 1
+        on_keyframe(done)
+        is_last = k + 1 == len(current.keyframes)
+        if is_last or current.keyframes[k + 1].submap != current.keyframes[k].submap:
+            sparse = submap_view.to_sparse()
+            of_previous.add_sparse(sparse)
+            by_submap.append(sparse)
+            submap_view = Observation(voxel_count)
+    return MutualObservation(of_current, of_previous, tuple(by_submap))

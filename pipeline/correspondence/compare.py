@@ -1,0 +1,203 @@
+"""Stage "compare": co-visible keyframes are matched patch by patch (paper, Sec. III-C.1).
+
+Every pair is matched once and serves both visits: links, heatmaps of either keyframe, and the evidence of
+the submap of the current keyframe.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.association.aggregation import MatchEvidence, patch_owners
+from pipeline.correspondence.covisibility import CovisibilityIndex, PatchView, patch_view, patch_warp
+from pipeline.correspondence.heatmaps import geometric_heatmap, semantic_heatmap
+from pipeline.correspondence.matching import best_nearby, match
+from pipeline.errors import SceneMismatchError
+from pipeline.mapping.front_end import SessionGeometry
+from pipeline.mapping.objects import SessionObjects
+from pipeline.perception.protocols import FeatureExtractor
+from pipeline.result import CovisiblePair, PatchLinks
+from pipeline.settings import CorrespondenceSettings, Settings
+
+GEOMETRIC_HEATMAP_STRIDE = 4
+
+
+@dataclass(frozen=True)
+class VisitImages:
+    """One visit as the comparison needs it.
+
+    Attributes:
+        geometry: its front-end output.
+        objects: its object map.
+        features: stored feature map of a keyframe.
+    """
+
+    geometry: SessionGeometry
+    objects: SessionObjects
+    features: Callable[[int], NDArray[np.float16]]
+
+
+@dataclass(frozen=True)
+class Covisibility:
+    """Which keyframes see the same place.
+
+    Attributes:
+        of_previous, of_current: best co-visible keyframes of the other visit, for each keyframe.
+        views0, views1: the keyframes on their patch grids.
+    """
+
+    of_previous: tuple[tuple[CovisiblePair, ...], ...]
+    of_current: tuple[tuple[CovisiblePair, ...], ...]
+    views0: list[PatchView]
+    views1: list[PatchView]
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """All (previous, current) pairs to compare, in the order of the current visit."""
+        forward = {(pair.other_keyframe, k) for k, found in enumerate(self.of_current) for pair in found}
+        backward = {(k, pair.other_keyframe) for k, found in enumerate(self.of_previous) for pair in found}
+        return sorted(forward | backward, key=lambda pair: (pair[1], pair[0]))
+
+
+def find_covisible(
+    previous: SessionGeometry,
+    current: SessionGeometry,
+    grids: tuple[tuple[int, int], tuple[int, int]],
+    settings: CorrespondenceSettings,
+) -> Covisibility:
+    """Co-visible keyframes of two visits.
+
+    Raises:
+        SceneMismatchError: no keyframe of one visit sees anything that the other one saw.
+    """
+    views0 = [patch_view(previous, k, grids[0]) for k in range(len(previous.keyframes))]
+    views1 = [patch_view(current, k, grids[1]) for k in range(len(current.keyframes))]
+    index0, index1 = CovisibilityIndex(views0), CovisibilityIndex(views1)
+    of_current = tuple(index0.best(view, settings) for view in views1)
+    of_previous = tuple(index1.best(view, settings) for view in views0)
+    if not any(of_current) and not any(of_previous):
+        raise SceneMismatchError(
+            "the two sessions never look at the same place",
+            "check that they show one site and that their poses share one world frame",
+        )
+    return Covisibility(of_previous, of_current, views0, views1)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What comparing all pairs gave.
+
+    Attributes:
+        evidence: (submaps of the current visit) match evidence of each.
+        light: mean lighting difference of the visits, as the extractor gives it; None without any.
+    """
+
+    evidence: tuple[MatchEvidence, ...]
+    light: NDArray[np.float64] | None
+
+
+def compare(
+    previous: VisitImages,
+    current: VisitImages,
+    covisibility: Covisibility,
+    extractor: FeatureExtractor,
+    settings: Settings,
+    *,
+    write_links: Callable[[int, int, PatchLinks], None],
+    write_heatmaps: Callable[[int, int, NDArray[np.float32], NDArray[np.float32]], None],
+    on_step: Callable[[int, int], None],
+) -> Comparison:
+    """Match all co-visible pairs and draw the heatmaps of both visits.
+
+    Args:
+        previous, current: the visits.
+        covisibility: which keyframes to compare.
+        extractor: made the features.
+        write_links: takes (previous keyframe, current keyframe, links).
+        write_heatmaps: takes (visit, keyframe, semantic, geometric).
+        on_step: takes steps done and steps in all.
+    """
+    radius = settings.correspondence.search_radius_patches
+    pairs = covisibility.pairs()
+    best = (_BestSimilarity(covisibility.views0), _BestSimilarity(covisibility.views1))
+    owners = (_PatchOwners(previous), _PatchOwners(current))
+    counts = (previous.objects.count, current.objects.count)
+    evidence = [MatchEvidence.empty(*counts) for _ in range(current.geometry.submap_count)]
+    lights = []
+    steps = len(pairs) + len(previous.geometry.keyframes) + len(current.geometry.keyframes)
+    for step, (k0, k1) in enumerate(pairs):
+        view0, view1 = covisibility.views0[k0], covisibility.views1[k1]
+        stored0, stored1 = previous.features(k0), current.features(k1)
+        into_previous = patch_warp(view1, view0)
+        light = extractor.light(stored0, stored1, into_previous)
+        matches = match(*extractor.comparable(stored0, stored1, light))
+        shape0, shape1 = stored0.shape[:2], stored1.shape[:2]
+        write_links(k0, k1, matches.links(shape0, shape1))
+        p, q, score = matches.correspondences()
+        evidence[current.geometry.keyframes[k1].submap].add(owners[0](k0)[p], owners[1](k1)[q], score)
+        best[1].add(k1, best_nearby(matches.correlation.T, into_previous, shape0, radius))
+        best[0].add(k0, best_nearby(matches.correlation, patch_warp(view0, view1), shape1, radius))
+        lights.append(light)
+        on_step(step + 1, steps)
+    done = len(pairs)
+    covisible = (covisibility.of_previous, covisibility.of_current)
+    for visit, (own, other) in enumerate(((previous, current), (current, previous))):
+        for k in range(len(own.geometry.keyframes)):
+            semantic = semantic_heatmap(
+                best[visit].of(k), extractor.similarity, settings.correspondence.heatmap_sigma_patches
+            )
+            geometric = _geometric(own.geometry, other.geometry, k, covisible[visit][k], visit == 1)
+            write_heatmaps(visit, k, semantic, geometric)
+            done += 1
+            on_step(done, steps)
+    mean_light = np.mean(lights, axis=0) if lights and lights[0].size else None
+    return Comparison(tuple(evidence), mean_light)
+
+
+def _geometric(
+    own: SessionGeometry,
+    other: SessionGeometry,
+    k: int,
+    covisible: tuple[CovisiblePair, ...],
+    own_is_current: bool,
+) -> NDArray[np.float32]:
+    step = GEOMETRIC_HEATMAP_STRIDE // own.stride
+    depth = own.store.depth(k)[::step, ::step]
+    camera = own.strided_camera(k).strided(step)
+    submaps = tuple(sorted({other.keyframes[pair.other_keyframe].submap for pair in covisible}))
+    other_depth = other.submaps.render_depth(submaps, camera, own.keyframes[k].T_world_camera)
+    return geometric_heatmap(depth, other_depth, own_is_current)
+
+
+class _BestSimilarity:
+    """The best correlation of each patch over all keyframes it was compared with."""
+
+    def __init__(self, views: list[PatchView]) -> None:
+        self._best = [np.full(view.depth.shape, np.nan, np.float32) for view in views]
+
+    def add(self, k: int, similarity: NDArray[np.float32]) -> None:
+        self._best[k] = np.fmax(self._best[k], similarity)
+
+    def of(self, k: int) -> NDArray[np.float32]:
+        return self._best[k]
+
+
+class _PatchOwners:
+    """Patch owners of keyframes, the recent ones remembered: pairs come sorted by current keyframe."""
+
+    _REMEMBERED = 64
+
+    def __init__(self, visit: VisitImages) -> None:
+        self._visit = visit
+        self._owners: dict[int, NDArray[np.int32]] = {}
+
+    def __call__(self, k: int) -> NDArray[np.int32]:
+        if k not in self._owners:
+            if len(self._owners) >= self._REMEMBERED:
+                self._owners.pop(next(iter(self._owners)))
+            grid = self._visit.features(k).shape[:2]
+            self._owners[k] = patch_owners(self._visit.objects.mask(self._visit.geometry, k), grid)
+        return self._owners[k]

@@ -1,0 +1,68 @@
+"""Stage "objects": masks of all keyframes become the object map of a visit (paper, Sec. III-B.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.association.aggregation import patch_owners
+from pipeline.mapping.front_end import SessionGeometry
+from pipeline.mapping.merging import ObjectMerger
+from pipeline.mapping.objects import SessionObjects, number_instances, remove_noise
+from pipeline.perception.embedded.refinement import refine_by_change
+from pipeline.perception.protocols import FeatureExtractor, MaskGenerator
+from pipeline.settings import Settings
+
+
+def find_objects(
+    geometry: SessionGeometry,
+    is_seen_through: NDArray[np.bool_],
+    generator: MaskGenerator,
+    extractor: FeatureExtractor,
+    features: Callable[[int], NDArray[np.float16]],
+    image: Callable[[int], NDArray[np.uint8]],
+    settings: Settings,
+) -> SessionObjects:
+    """Ask for the masks of every keyframe, lift and merge them, and clean the outcome.
+
+    Args:
+        geometry: the mapped visit.
+        is_seen_through: (M,) voxels that are empty in the other visit: what came or went as one is an object
+            even where masks missed it.
+        generator: makes the masks.
+        extractor, features: for the semantic similarity of masks.
+        image: colour image of a keyframe, only read when the generator needs pixels.
+        settings: of the run.
+    """
+    surface = geometry.surface
+    merger = ObjectMerger(
+        len(surface.points_world), settings.merge, masks_are_tracks=generator.masks_are_tracks
+    )
+    generator.prepare(surface)
+    for k in range(len(geometry.keyframes)):
+        voxels = geometry.store.voxels(k)
+        masks = generator.masks(partial(image, k), voxels)
+        tokens = None if generator.masks_are_tracks else mask_tokens(masks, features(k), extractor)
+        merger.add(masks, voxels, tokens)
+    objects = remove_noise(surface, merger.finish())
+    objects = refine_by_change(surface, objects, is_seen_through, settings.discovery.min_voxels)
+    return number_instances(geometry, objects, settings.discovery.min_voxels, settings.discovery.min_views)
+
+
+def mask_tokens(
+    masks: NDArray[np.int32], stored: NDArray[np.float16], extractor: FeatureExtractor
+) -> dict[int, NDArray[np.floating]]:
+    """Unit mean feature of every mask of a keyframe (paper: pooling F over the mask gives f).
+
+    Only for merging masks of one visit; the tokens themselves are kept and compared one by one later.
+    """
+    features, _ = extractor.comparable(stored, stored, None)
+    owners = patch_owners(masks, stored.shape[:2])
+    tokens: dict[int, NDArray[np.floating]] = {}
+    for number in np.unique(owners[owners > 0]):
+        mean = features[owners == number].mean(axis=0)
+        tokens[int(number)] = mean / max(float(np.linalg.norm(mean)), 1e-9)
+    return tokens

@@ -1,0 +1,358 @@
+"""From two sessions to a change map: reads like the paper's system figure."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from hashlib import blake2b
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline import checkpoint
+from pipeline.assemble import Assembled, assemble
+from pipeline.change.decide import Conclusion, decide
+from pipeline.change.observe import MutualObservation, observe
+from pipeline.correspondence.compare import (
+    Comparison,
+    Covisibility,
+    VisitImages,
+    compare,
+    find_covisible,
+)
+from pipeline.errors import OasisError
+from pipeline.mapping.dense_map import dense_map
+from pipeline.mapping.find_objects import find_objects
+from pipeline.mapping.front_end import KeyframeSinks, SessionGeometry, map_session, reopen_stores
+from pipeline.mapping.keyframes import select_keyframes
+from pipeline.mapping.objects import SessionObjects
+from pipeline.mapping.scale import voxel_size_m
+from pipeline.perception.protocols import FeatureExtractor
+from pipeline.perception.registry import feature_extractor, mask_generator
+from pipeline.progress import ProgressEvent, Report, Warned, silent
+from pipeline.readers import open_session
+from pipeline.readers.fingerprint import fingerprint
+from pipeline.result import CovisiblePair, KeyframeRecord, Result
+from pipeline.session import Session
+from pipeline.settings import Settings
+from pipeline.store import ResultWriter, finished_result
+
+# Changes whenever the same inputs and settings would give another result.
+ENGINE_VERSION = 1
+VISITS = ("previous", "current")
+
+
+def run(
+    previous: Path | str,
+    current: Path | str,
+    *,
+    settings: Settings | None = None,
+    output: Path | str | None = None,
+    report: Report = silent,
+) -> Result:
+    """Compare two visits of a place.
+
+    Args:
+        previous, current: session archives (see ``pipeline.readers``).
+        settings: of the engine.
+        output: the result folder to write (``NAME.oasis``); None = a temporary folder. A finished result of
+            the same inputs and settings is taken as it is; an interrupted run goes on where it stopped.
+        report: told about progress and about what had to be left out.
+
+    Raises:
+        InputError: an archive or a setting is wrong, or the sessions never see the same place.
+        StorageError: the result cannot be written.
+    """
+    settings = settings or Settings()
+    extractor = feature_extractor(settings)
+    report(ProgressEvent("open", 0, 2))
+    sessions = (open_session(Path(previous)), open_session(Path(current)))
+    for session in sessions:
+        for line in session.warnings:
+            report(Warned(line))
+    fingerprints = tuple(fingerprint(session) for session in sessions)
+    key = run_key(fingerprints, settings)
+    report(ProgressEvent("open", 2, 2))
+    path = Path(output) if output is not None else Path(tempfile.mkdtemp()) / "changes.oasis"
+    finished = finished_result(path, key)
+    if finished is not None:
+        return finished
+    with ResultWriter(path, key) as writer:
+        return _Run(sessions, fingerprints, settings, extractor, writer, report).result()
+
+
+def run_key(fingerprints: tuple[str, ...], settings: Settings) -> str:
+    """Hash of everything that a result follows from."""
+    content = {"engine": ENGINE_VERSION, "inputs": list(fingerprints), "settings": settings.to_dict()}
+    return blake2b(json.dumps(content, sort_keys=True).encode(), digest_size=20).hexdigest()
+
+
+class _Run:
+    """One run: each method is a stage, and is skipped when an earlier run finished it."""
+
+    def __init__(
+        self,
+        sessions: tuple[Session, Session],
+        fingerprints: tuple[str, ...],
+        settings: Settings,
+        extractor: FeatureExtractor,
+        writer: ResultWriter,
+        report: Report,
+    ) -> None:
+        self._sessions = sessions
+        self._fingerprints = fingerprints
+        self._settings = settings
+        self._extractor = extractor
+        self._writer = writer
+        self._report = report
+        self._timings_s: dict[str, float] = {}
+        self._warnings = [line for session in sessions for line in session.warnings]
+
+    def result(self) -> Result:
+        """All stages, in the order in which data walks."""
+        geometries = self._front_end()
+        covisibility = self._covisibility(geometries)
+        observation = self._observe(geometries)
+        objects = self._objects(geometries, observation)
+        visits = self._visit_images(geometries, objects)
+        comparison = self._compare(visits, covisibility)
+        conclusion = self._decide(visits, observation, comparison)
+        assembled = assemble(*visits, conclusion, self._settings)
+        return self._write(visits, covisibility, conclusion, assembled)
+
+    def _front_end(self) -> tuple[SessionGeometry, SessionGeometry]:
+        settings = self._settings
+        selected = tuple(select_keyframes(session, settings.keyframes) for session in self._sessions)
+        # One voxel size for both visits, from the one that was there first.
+        voxel_m = voxel_size_m(self._sessions[0], selected[0], settings)
+        geometries = []
+        for visit, (session, positions) in enumerate(zip(self._sessions, selected, strict=True)):
+            stage = f"map_{VISITS[visit]}"
+            with self._stage(stage) as is_done:
+                folder = self._writer.work / stage
+                if is_done:
+                    store, submaps = reopen_stores(folder, voxel_m, settings)
+                    stride = settings.image.geometry_stride
+                    geometry = checkpoint.load_geometry(self._writer, visit, store, submaps, stride)
+                else:
+                    geometry = map_session(
+                        session,
+                        positions,
+                        voxel_m,
+                        self._extractor,
+                        settings,
+                        folder,
+                        self._sinks(visit),
+                        on_keyframe=self._progress(stage, len(positions)),
+                        warn=self._warn,
+                    )
+                    checkpoint.save_geometry(self._writer, visit, geometry)
+            geometries.append(geometry)
+        return geometries[0], geometries[1]
+
+    def _sinks(self, visit: int) -> KeyframeSinks:
+        def write_image(frame_index: int, rgb: NDArray[np.uint8]) -> None:
+            self._writer.write_image(visit, frame_index, rgb)
+
+        def write_features(frame_index: int, features: NDArray[np.float16]) -> None:
+            self._writer.write_features(visit, frame_index, features)
+
+        return KeyframeSinks(write_image, write_features)
+
+    def _covisibility(self, geometries: tuple[SessionGeometry, SessionGeometry]) -> Covisibility:
+        grids = tuple(self._features(visit, geometries[visit])(0).shape[:2] for visit in range(2))
+        return find_covisible(*geometries, (grids[0], grids[1]), self._settings.correspondence)
+
+    def _observe(self, geometries: tuple[SessionGeometry, SessionGeometry]) -> MutualObservation:
+        sizes = tuple(len(geometry.surface.points_world) for geometry in geometries)
+        with self._stage("observe") as is_done:
+            if is_done:
+                return checkpoint.load_observation(
+                    self._writer, sizes[0], sizes[1], geometries[1].submap_count
+                )
+            total = sum(len(geometry.keyframes) for geometry in geometries)
+            observation = observe(*geometries, self._settings, self._progress("observe", total))
+            checkpoint.save_observation(self._writer, observation)
+            return observation
+
+    def _objects(
+        self, geometries: tuple[SessionGeometry, SessionGeometry], observation: MutualObservation
+    ) -> tuple[SessionObjects, SessionObjects]:
+        observed = (observation.of_previous, observation.of_current)
+        found = []
+        with self._stage("objects") as is_done:
+            for visit, geometry in enumerate(geometries):
+                if is_done:
+                    found.append(checkpoint.load_objects(self._writer, visit))
+                    continue
+                objects = find_objects(
+                    geometry,
+                    observed[visit].is_seen_through(self._settings.observation),
+                    mask_generator(self._settings),
+                    self._extractor,
+                    self._features(visit, geometry),
+                    partial(self._image, visit, geometry),
+                    self._settings,
+                )
+                checkpoint.save_objects(self._writer, visit, objects)
+                found.append(objects)
+                self._report(ProgressEvent("objects", visit + 1, 2))
+        return found[0], found[1]
+
+    def _visit_images(
+        self,
+        geometries: tuple[SessionGeometry, SessionGeometry],
+        objects: tuple[SessionObjects, SessionObjects],
+    ) -> tuple[VisitImages, VisitImages]:
+        visits = [
+            VisitImages(geometry, objects[visit], self._features(visit, geometry))
+            for visit, geometry in enumerate(geometries)
+        ]
+        return visits[0], visits[1]
+
+    def _compare(self, visits: tuple[VisitImages, VisitImages], covisibility: Covisibility) -> Comparison:
+        frames = [[keyframe.frame_index for keyframe in visit.geometry.keyframes] for visit in visits]
+        with self._stage("compare") as is_done:
+            if is_done:
+                return checkpoint.load_comparison(self._writer)
+            comparison = compare(
+                *visits,
+                covisibility,
+                self._extractor,
+                self._settings,
+                write_links=lambda k0, k1, links: self._writer.write_links(
+                    frames[0][k0], frames[1][k1], links
+                ),
+                write_heatmaps=lambda visit, k, semantic, geometric: self._writer.write_heatmaps(
+                    visit, frames[visit][k], semantic, geometric
+                ),
+                on_step=lambda done, total: self._report(ProgressEvent("compare", done, total)),
+            )
+            checkpoint.save_comparison(self._writer, comparison)
+            return comparison
+
+    def _decide(
+        self,
+        visits: tuple[VisitImages, VisitImages],
+        observation: MutualObservation,
+        comparison: Comparison,
+    ) -> Conclusion:
+        with self._stage("decide"):
+            on_submap = self._progress("decide", len(comparison.evidence))
+            return decide(*visits, observation, comparison, self._extractor, self._settings, on_submap)
+
+    def _write(
+        self,
+        visits: tuple[VisitImages, VisitImages],
+        covisibility: Covisibility,
+        conclusion: Conclusion,
+        assembled: Assembled,
+    ) -> Result:
+        ids = (assembled.ids0, assembled.ids1)
+        covisible = (covisibility.of_previous, covisibility.of_current)
+        total = sum(len(visit.geometry.keyframes) for visit in visits)
+        started = time.perf_counter()
+        written = 0
+        for visit, images in enumerate(visits):
+            geometry, session = images.geometry, self._sessions[visit]
+            for k, keyframe in enumerate(geometry.keyframes):
+                self._writer.write_mask(
+                    visit, keyframe.frame_index, ids[visit][images.objects.mask(geometry, k)]
+                )
+            on_keyframe = self._progress("write", total, written)
+            points = dense_map(geometry, images.objects.instance_of_voxel, on_keyframe)
+            written += len(geometry.keyframes)
+            self._writer.write_map(visit, points.points_world, points.colours, ids[visit][points.instances])
+            self._writer.write_session(
+                visit,
+                name=session.name,
+                captured_at=session.captured_at,
+                archive=str(session.path),
+                up_world=geometry.surface.up_world,
+                keyframes=_keyframe_records(geometry, covisible[visit]),
+            )
+        self._writer.write_objects(
+            assembled.objects, assembled.replaced, assembled.score_matrix, assembled.belief
+        )
+        self._timings_s["write"] = round(time.perf_counter() - started, 3)
+        return self._writer.finish(self._manifest(visits, conclusion))
+
+    def _manifest(self, visits: tuple[VisitImages, VisitImages], conclusion: Conclusion) -> dict[str, object]:
+        return {
+            "settings": self._settings.to_dict(),
+            "inputs": [
+                {
+                    "name": session.name,
+                    "archive": str(session.path),
+                    "format": session.format,
+                    "fingerprint": self._fingerprints[visit],
+                    "frames": len(session.frames),
+                    "keyframes": len(visits[visit].geometry.keyframes),
+                    "captured_at": session.captured_at,
+                }
+                for visit, session in enumerate(self._sessions)
+            ],
+            "weights": {"features": self._extractor.weights_hash},
+            "quality": {
+                "voxel_size_m": round(visits[0].geometry.surface.voxel_size_m, 6),
+                "appearance_scale_log": round(conclusion.appearance_scale, 4),
+                "appearance_used": bool(
+                    conclusion.appearance_scale <= self._settings.change.reliable_appearance_scale
+                ),
+            },
+            "warnings": self._warnings,
+            "timings_s": self._timings_s,
+        }
+
+    def _features(self, visit: int, geometry: SessionGeometry) -> Callable[[int], NDArray[np.float16]]:
+        frames = [keyframe.frame_index for keyframe in geometry.keyframes]
+        return lambda k: self._writer.read_features(visit, frames[k])
+
+    def _image(self, visit: int, geometry: SessionGeometry, k: int) -> NDArray[np.uint8]:
+        return self._writer.read_image(visit, geometry.keyframes[k].frame_index)
+
+    def _warn(self, line: str) -> None:
+        self._warnings.append(line)
+        self._report(Warned(line))
+
+    def _progress(self, stage: str, total: int, before: int = 0) -> Callable[[int], None]:
+        return lambda done: self._report(ProgressEvent(stage, before + done, total))
+
+    @contextmanager
+    def _stage(self, name: str) -> Iterator[bool]:
+        """Time a stage and mark it done; yields whether it was done before (a resumed run)."""
+        if self._writer.stage_done(name):
+            info = self._writer.stage_info(name)
+            self._timings_s[name] = info["seconds"]
+            self._warnings += [line for line in info["warnings"] if line not in self._warnings]
+            yield True
+            return
+        started, warned = time.perf_counter(), len(self._warnings)
+        try:
+            yield False
+        except (MemoryError, RecursionError) as error:
+            raise OasisError(f"stage {name!r} ran out of memory", "raise surface.voxel_size_m") from error
+        seconds = round(time.perf_counter() - started, 3)
+        self._timings_s[name] = seconds
+        self._writer.mark_stage(name, {"seconds": seconds, "warnings": self._warnings[warned:]})
+
+
+def _keyframe_records(
+    geometry: SessionGeometry, covisible: tuple[tuple[CovisiblePair, ...], ...]
+) -> list[KeyframeRecord]:
+    return [
+        KeyframeRecord(
+            frame_index=keyframe.frame_index,
+            timestamp_s=keyframe.timestamp_s,
+            submap=keyframe.submap,
+            camera=keyframe.camera,
+            T_world_camera=keyframe.T_world_camera,
+            covisible=covisible[k],
+        )
+        for k, keyframe in enumerate(geometry.keyframes)
+    ]
