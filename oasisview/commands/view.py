@@ -54,10 +54,10 @@ def _finished_result(path: Path) -> Path:
 
 def serve(source: Path | Job, arguments: argparse.Namespace) -> int:
     """Serve the viewer with the options of ``add_serve_options``; returns when it is stopped."""
-    from oasisview import app
+    from oasisview.app import serve as serve_viewer
 
     try:
-        app.serve(source, host=arguments.host, port=arguments.port, open_browser=not arguments.no_open)
+        serve_viewer(source, host=arguments.host, port=arguments.port, open_browser=not arguments.no_open)
     except KeyboardInterrupt:
         print("stopped", file=sys.stderr)  # Ctrl-C is how a viewer is meant to end
     return 0
