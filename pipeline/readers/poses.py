@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.camera import T_OPENGL_OPENCV, is_rigid
+from pipeline.camera import T_OPENGL_OPENCV
 from pipeline.errors import InputError
 
 ROUNDING = 1e-6  # deviation from orthonormal up to which a pose is taken as it is
+MAX_DEVIATION = 1e-2  # up to which it is repaired
+IDENTITY, LAST_ROW = np.eye(3), np.array([0.0, 0.0, 0.0, 1.0])
 
 
 def checked_pose(matrix: Any) -> NDArray[np.float64]:
@@ -26,22 +28,24 @@ def checked_pose(matrix: Any) -> NDArray[np.float64]:
     except (TypeError, ValueError, OverflowError):
         raise InputError("its pose is not a matrix of numbers") from None
     if T.shape == (3, 4):
-        T = np.vstack([T, [0.0, 0.0, 0.0, 1.0]])
+        T = np.vstack([T, LAST_ROW])
     if T.shape != (4, 4):
         raise InputError(f"its pose has shape {T.shape} instead of (4, 4)")
     if not np.isfinite(T).all():
         raise InputError("its pose is not finite")
-    if not is_rigid(T):
-        raise InputError(_why_not_rigid(T))
     rotation = T[:3, :3]
-    if np.abs(rotation @ rotation.T - np.eye(3)).max() > ROUNDING:
+    deviation = np.abs(rotation @ rotation.T - IDENTITY).max()
+    is_homogeneous = np.abs(T[3] - LAST_ROW).max() <= ROUNDING
+    if deviation > MAX_DEVIATION or not is_homogeneous or np.linalg.det(rotation) <= 0:
+        raise InputError(_why_not_rigid(T))
+    if deviation > ROUNDING:
         u, _, vt = np.linalg.svd(rotation)
         T[:3, :3] = u @ vt
     return T
 
 
 def _why_not_rigid(T: NDArray[np.float64]) -> str:
-    if not np.allclose(T[3], [0, 0, 0, 1], atol=1e-6):
+    if np.abs(T[3] - LAST_ROW).max() > ROUNDING:
         return "its pose is not rigid (the last row is not 0 0 0 1)"
     rotation = T[:3, :3]
     determinant = float(np.linalg.det(rotation))
