@@ -81,6 +81,7 @@ class Catalogue:
         self._prefix = hashlib.sha256(stamp.encode()).hexdigest()[:12]
         self.view_of = lru_cache(maxsize=1024)(self._view_of)
         self.before_after = lru_cache(maxsize=256)(self._before_after)
+        self._thumbnail = lru_cache(maxsize=4096)(self._tight_crop)
         self.mask = lru_cache(maxsize=64)(self._mask)
 
     def session(self, index: int) -> SessionResult:
@@ -161,11 +162,23 @@ class Catalogue:
             )
         return _png(image)
 
-    def thumbnail_url(self, object_id: int) -> str:
-        """A small picture of an object, from the latest visit that saw it; empty without any view."""
+    def thumbnail_url(self, object_id: int, session: int | None = None) -> str:
+        """A small picture of an object, by default from the latest visit that saw it; empty without any."""
+        return self._thumbnail(object_id, session)
+
+    def _tight_crop(self, object_id: int, session: int | None) -> str:
         item = self.objects.get(object_id)
-        view = self.view_of(object_id, self.shown_session(item)) if item is not None else None
-        return view.url if view is not None else ""
+        if item is None:
+            return ""
+        view = self.view_of(object_id, self.shown_session(item) if session is None else session)
+        if view is None:
+            return ""
+        camera = self.session(view.session).keyframes[view.keyframe].camera
+        bounds = crops.mask_box(self.mask(view.session, view.keyframe) == object_id, camera)
+        if bounds is None:
+            return view.url
+        tight = crops.crop_around(bounds, camera, scale=1.1, margin_px=8)
+        return self._crop_url(view.session, view.keyframe, tight)
 
     def matrix_url(self, kind: str) -> str:
         """The whole score matrix as an image, one pixel a cell; kind is ``sigma`` or ``s_bar``."""

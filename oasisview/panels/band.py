@@ -36,9 +36,7 @@ def band_html(
     record = visit.keyframes[keyframe]
     this_word, other_word = wording.visit_word(session), wording.visit_word(other)
     pictures = [
-        _image(
-            catalogue, "this", this_word, f"keyframe {keyframe + 1}", session, keyframe, selected, label_of
-        )
+        _image(catalogue, "this", this_word, f"kf {keyframe + 1}", session, keyframe, selected, label_of)
     ]
     if pair is None:
         empty = f'<div class="oa-empty">{wording.NO_SHARED_VIEW}</div>'
@@ -49,7 +47,7 @@ def band_html(
         ):
             pictures.append(_figure(part, title, "", f'<div class="oa-pic">{empty}</div>', ""))
     else:
-        note = f"keyframe {pair.other_keyframe + 1} \u00b7 {wording.percent(pair.shared)} shared"
+        note = f"kf {pair.other_keyframe + 1} \u00b7 {wording.percent(pair.shared)} shared"
         pictures.append(
             _image(catalogue, "other", other_word, note, other, pair.other_keyframe, selected, label_of)
         )
@@ -148,11 +146,11 @@ def _heatmap(
     )
     if kind == "semantic":
         bar = _colour_bar("same 0", "1 changed", gradient_css(CIVIDIS))
-        note = "semantic, 0 to 1"
+        note = "semantic"
     else:
         reach = f"{GEOMETRIC_RANGE_M:.1f} m"
         bar = _colour_bar(f"gone \u2212{reach}", f"+{reach} new", gradient_css(geometric_anchors(dark=dark)))
-        note = "geometric, metres"
+        note = "geometric"
     return _figure(kind, title, note, body, bar)
 
 
@@ -204,5 +202,5 @@ def _overlay(
 def _colour_bar(low: str, high: str, gradient: str) -> str:
     return (
         f'<div class="oa-colours"><span>{low}</span><i style="background:{gradient}"></i><span>{high}</span>'
-        '<i class="oa-hatch" title="not seen by both visits"></i><span>not seen by both</span></div>'
+        '<i class="oa-hatch" title="not seen by both visits"></i><span title="not seen by both visits">unseen</span></div>'
     )

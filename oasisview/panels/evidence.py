@@ -139,12 +139,12 @@ def _figure(item: MapObject, session: int, view: ObjectView | None) -> str:
     if view.place is not None:
         x, y, width, height = view.place
         mark = f'<rect x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" class="oa-place"/>'
-        caption = f"{word}: same place \u00b7 keyframe {view.keyframe + 1}"
+        caption = f"{word}: same place \u00b7 kf {view.keyframe + 1}"
     else:
         mark = (
             f'<path d="{view.outline}" class="oa-halo"/><path d="{view.outline}" class="oa-line oa-{label}"/>'
         )
-        caption = f"{word} \u00b7 keyframe {view.keyframe + 1}"
+        caption = f"{word} \u00b7 kf {view.keyframe + 1}"
     jump = sends("keyframe", {"session": session, "keyframe": view.keyframe})
     return (
         f'<figure {jump} title="Show this keyframe below the map">{picture(view.url, caption)}'
@@ -170,11 +170,19 @@ def _lines(views: BeforeAfter) -> str:
 
 
 def _link_note(views: BeforeAfter) -> str:
+    if views.before is None or views.after is None:
+        return ""
     if views.lines:
         landing = sum(line.lands_on_object for line in views.lines)
-        text = f"{len(views.lines)} strongest patch matches; {landing} end on the same object"
-        if landing < len(views.lines):
-            text += ", dashed ones do not"
+        count = len(views.lines)
+        if landing == count:
+            text = f"Its {count} strongest patch matches, all on the same object."
+        elif landing:
+            text = (
+                f"Its {count} strongest patch matches: {landing} on the same object, dashed ones elsewhere."
+            )
+        else:
+            text = f"Its {count} strongest patch matches (dashed) end on other things."
     elif views.compared:
         text = "No patch of the object finds a match in the other picture."
     else:
@@ -235,7 +243,7 @@ def _replaced(catalogue: Catalogue, item: MapObject) -> str:
 def _candidates(catalogue: Catalogue, item: MapObject) -> str:
     found = candidates(catalogue, item)
     which = "row" if item.sighting(0) is not None else "column"
-    head = section("Possible counterparts", f"its {which} of the score matrix")
+    head = section("Candidates", f"{which} of the score matrix")
     if not found:
         return (
             head + '<div class="oa-note">No patch of this object matched any object of the other visit.</div>'
@@ -317,7 +325,7 @@ def _verdict_bar(item: MapObject, verdict: Verdict | None, can_undo: bool, can_r
             f'<button class="oa-{name}{machine}" aria-pressed="{pressed}" title="{tip}" '
             f"{sends('decide', name)}>{chip(label)}<span>{LABEL_WORDS[label]}</span>{key(str(number))}</button>"
         )
-    accept = f"Accept \u201c{LABEL_NAMES[item.label]}\u201d"
+    accept = f"Accept \u201c{LABEL_WORDS[item.label]}\u201d"
     return (
         f'<div class="oa-verdict"><div class="oa-verdicts" role="group" aria-label="Label">{"".join(buttons)}</div>'
         f'<div class="oa-accept"><button class="oa-primary" data-accept {sends("accept")}>{accept} {key("Enter")}</button>'

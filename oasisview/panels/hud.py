@@ -85,7 +85,7 @@ def legend_html(colours: str, mode: str) -> str:
         items = "".join(f"<span>{chip(label)}{LABEL_NAMES[label]}</span>" for label in LABEL_ORDER)
         items += f"<span>{chip('replaced')}replaced pair</span>"
         if mode == "both":
-            items += '<span class="oa-muted">blue and amber diamonds: as it was before</span>'
+            items += '<span class="oa-muted">diamonds: as it was before</span>'
     elif colours == "identity":
         items = "<span>One colour per object, the same on both visits; grey is background</span>"
     else:

@@ -89,9 +89,9 @@ def _pair(catalogue: Catalogue, cell: tuple[int, int] | None) -> str:
         verdict = wording.CASE_WORDS[pair_case(sigma, s_bar, catalogue.limits)].capitalize() + "."
     tiles = "".join(
         f'<figure role="button" tabindex="0" {sends("select", object_id)} title="Show this object">'
-        f"{picture(catalogue.thumbnail_url(object_id), wording.object_name(object_id))}"
+        f"{picture(catalogue.thumbnail_url(object_id, session), wording.object_name(object_id))}"
         f"<figcaption>{word}: #{object_id}</figcaption></figure>"
-        for word, object_id in (("Before", before), ("After", after))
+        for session, (word, object_id) in enumerate((("Before", before), ("After", after)))
     )
     return (
         f'<div class="oa-pair" data-pair="{before}-{after}">{section("This pair")}<div class="oa-tiles">{tiles}</div>'

@@ -61,7 +61,9 @@ class MapView:
         self._mode, self._colours, self._layers, self._dark = "after", "label", Layers(), False
         self._clouds: dict[str, viser.PointCloudHandle] = {}
         self._picks: dict[int, viser.BatchedMeshHandle] = {}
-        
+        self._names: dict[int, viser.LabelHandle] = {}
+        self._selected: int | None = None
+
     def build(self, mode: str, colours: str, layers: Layers, *, dark: bool) -> None:
         """Send everything once."""
         self._mode, self._colours, self._layers, self._dark = mode, colours, layers, dark
@@ -125,6 +127,11 @@ class MapView:
         with self._client.atomic():
             for name in ("box", "ghost", "way", "name", "points"):
                 self._remove(f"/map/selected/{name}")
+            # The selected object carries a larger name of its own.
+            for object_id, shown in ((self._selected, True), (item.object_id if item else None, False)):
+                if object_id in self._names:
+                    self._names[object_id].visible = shown
+            self._selected = item.object_id if item is not None else None
             if item is not None and item.sightings:
                 self._mark(item)
 
@@ -289,8 +296,8 @@ class MapView:
 
     def _boxes(self) -> None:
         """Thin boxes around everything that is not static, dashed where it is no more."""
-        segments, colours, names = [], [], []
-        palette = self._label_rgb[self._dark]
+        segments: dict[ChangeLabel, list[NDArray[np.float32]]] = {}
+        names = []
         for item in self._catalogue.by_doubt():
             label = self._label_of(item.object_id)
             sighting = self._shown_sighting(item)
@@ -299,33 +306,37 @@ class MapView:
             edges = self._box(sighting)
             if sighting.session == 0 and self._mode == "both":
                 edges = outlines.dashed(edges, max(0.03, 2 * self._points.point_size_m))
-            segments.append(edges)
-            colours.append(np.broadcast_to(np.array(palette[label], np.uint8), (*edges.shape[:2], 3)))
+            segments.setdefault(label, []).append(edges)
             names.append((item.object_id, label, sighting))
-        self._remove("/map/boxes")
-        if segments:
-            self._scene.add_line_segments(
-                "/map/boxes",
-                np.concatenate(segments),
-                np.concatenate(colours),
-                thickness=1.6,
-                thickness_units="screen",
-                visible=self._layers.boxes,
-            )
-        self._names(names)
+        self._scene.add_frame("/map/boxes", show_axes=False, visible=self._layers.boxes)
+        for label in ChangeLabel:
+            self._remove(f"/map/boxes/{LABEL_NAMES[label]}")
+            if label in segments:
+                # One colour a node: viser draws per-segment colours white once a node is replaced.
+                self._scene.add_line_segments(
+                    f"/map/boxes/{LABEL_NAMES[label]}",
+                    np.concatenate(segments[label]),
+                    self._label_rgb[self._dark][label],
+                    thickness=1.6,
+                    thickness_units="screen",
+                )
+        self._name(names)
 
-    def _names(self, shown: Sequence[tuple[int, ChangeLabel, Sighting]]) -> None:
+    def _name(self, shown: Sequence[tuple[int, ChangeLabel, Sighting]]) -> None:
         self._remove("/map/names")
         self._scene.add_frame("/map/names", show_axes=False, visible=self._layers.names)
         up = self._points.up_world
-        for object_id, label, sighting in shown[:MAX_NAMES]:
-            self._scene.add_label(
+        self._names = {
+            object_id: self._scene.add_label(
                 f"/map/names/{object_id}",
                 f"{GLYPHS[LABEL_NAMES[label]]} {object_id}",
                 position=self._top(sighting) + 0.04 * up,
                 anchor="bottom-center",
                 font_screen_scale=0.8,
+                visible=object_id != self._selected,
             )
+            for object_id, label, sighting in shown[:MAX_NAMES]
+        }
 
     def _shown_sighting(self, item: MapObject) -> Sighting | None:
         if self._mode == "before":

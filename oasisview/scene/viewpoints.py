@@ -43,7 +43,7 @@ def overview(points_world: NDArray[np.floating], up_world: NDArray[np.floating])
     low, high = np.percentile(sample, 2, axis=0), np.percentile(sample, 98, axis=0)
     centre = (low + high) / 2
     reach = max(float(np.linalg.norm((high - low)[:2])), 0.5)
-    position = centre + np.array([-0.38, -0.56, 0.74]) * reach * 0.92
+    position = centre + np.array([-0.38, -0.56, 0.74]) * reach * 0.75
     return _viewpoint(position @ axes, centre @ axes)
 
 
