@@ -17,6 +17,7 @@ from pipeline.settings import ArchiveSettings
 
 READERS: tuple[Reader, ...] = (NerfstudioReader(), TumReader(), ThreeRScanReader(), SevenScenesReader())
 MAX_NESTING = 3  # folders around the recording: many tools pack "visit1/" instead of its content
+MAX_SUGGESTIONS = 100
 
 __all__ = ["READERS", "open_session"]
 
@@ -36,6 +37,10 @@ def open_session(path: Path | str, settings: ArchiveSettings | None = None) -> S
     for reader, found in ((reader, found) for found in _candidates(tree) for reader in READERS):
         if reader.matches(found):
             return reader.read(found, settings)
+    if inner := _recordings_inside(tree):
+        raise InputError(
+            f"{tree.path} holds {len(inner)} recordings", f"name one of them: {', '.join(inner[:5])}"
+        )
     wanted = "; ".join(f"{reader.looks_for} ({reader.name})" for reader in READERS)
     raise InputError(f"{tree.path} holds no recording of a known format", f"looked for {wanted}")
 
@@ -46,6 +51,12 @@ def _open_tree(path: Path, settings: ArchiveSettings) -> FileTree:
     if not path.exists():
         raise InputError(f"there is no archive {path}", "name a folder, .zip, .tar or .tar.gz")
     return open_packed(path, settings)
+
+
+def _recordings_inside(tree: FileTree) -> list[str]:
+    """Folders that would open by themselves, for whoever named the folder above them."""
+    folders = sorted(tree.entries()[1])[:MAX_SUGGESTIONS]
+    return [name for name in folders if any(reader.matches(SubTree(tree, name)) for reader in READERS)]
 
 
 def _candidates(tree: FileTree) -> list[FileTree]:

@@ -20,7 +20,7 @@ from pipeline.settings import ArchiveSettings
 TRANSFORMS = "transforms.json"
 INTRINSIC_KEYS = ("fl_x", "fl_y", "cx", "cy", "w", "h", "k1", "k2", "k3", "p1", "p2")
 DEPTH_SOURCES: tuple[DepthSource, ...] = ("sensor", "lidar", "learned")
-UNDISTORTED_MODELS = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE")
+CAMERA_MODELS = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL")  # all within k1 to p2
 
 
 class NerfstudioReader:
@@ -41,7 +41,7 @@ class NerfstudioReader:
         if not isinstance(entries, list) or not entries:
             raise InputError(f"{where}: 'frames' is missing or empty", "a list of frames is expected")
         model = document.get("camera_model", "OPENCV")
-        if model not in UNDISTORTED_MODELS:
+        if model not in CAMERA_MODELS:
             raise InputError(
                 f"{where}: camera model {model!r} is not supported",
                 "undistort the images to OPENCV or PINHOLE first",

@@ -238,3 +238,11 @@ def test_byte_order_mark_and_dot_slash_paths_are_read(tmp_path: Path) -> None:
     (tmp_path / "transforms.json").write_text(json.dumps(document), encoding="utf-8-sig")
 
     assert len(open_session(tmp_path).frames) == 2
+
+
+def test_wide_colour_and_depth_of_almost_the_same_shape_are_paired(tmp_path: Path) -> None:
+    # 1920 x 1440 colour with 256 x 192 depth is the usual pair of a phone; here at a tenth.
+    what = recording(2, (192, 144), (26, 19))
+    write_nerfstudio(tmp_path, what, fl_x=150.0, fl_y=150.0)
+
+    assert open_session(tmp_path).frames[0].load_depth().shape == (144, 192)

@@ -61,6 +61,15 @@ def test_packed_archive_gives_the_same_session(
     assert sorted(folder.parent.rglob("*")) == before  # nothing was unpacked beside it
 
 
+def test_what_macos_adds_to_a_zip_does_not_hide_the_recording(folder: Path) -> None:
+    archive = folder.parent / "visit.zip"
+    pack_zip(folder, archive)
+    write_member(archive, "__MACOSX/source/._transforms.json")
+    write_member(archive, ".DS_Store")
+
+    assert len(open_session(archive).frames) == 3
+
+
 @pytest.mark.parametrize(("name", "pack"), PACKERS)
 def test_frames_load_from_many_threads(folder: Path, name: str, pack: Callable[[Path, Path], None]) -> None:
     archive = folder.parent / name

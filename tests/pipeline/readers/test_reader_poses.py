@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from archive_writers import opengl_from_opencv, random_poses
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.camera import is_rigid
@@ -10,9 +10,11 @@ from pipeline.readers.filetree import normalised
 from pipeline.readers.poses import checked_pose, opencv_from_opengl
 from pipeline.readers.tum import nearest
 
+patient = settings(deadline=None)  # shared machines pause for longer than any deadline
 seeds = st.integers(0, 2**32 - 1)
 
 
+@patient
 @given(seeds)
 def test_opengl_and_opencv_cameras_see_the_same_point(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -26,6 +28,7 @@ def test_opengl_and_opencv_cameras_see_the_same_point(seed: int) -> None:
     np.testing.assert_allclose(opengl_from_opencv(T_world_opencv), T_world_opengl, atol=1e-12)
 
 
+@patient
 @given(seeds)
 def test_rigid_poses_pass_unchanged(seed: int) -> None:
     T = random_poses(np.random.default_rng(seed), 1)[0]
@@ -34,6 +37,7 @@ def test_rigid_poses_pass_unchanged(seed: int) -> None:
     np.testing.assert_array_equal(checked_pose(T[:3].tolist()), T)
 
 
+@patient
 @given(seeds, st.floats(1e-5, 2e-3))
 def test_rounded_rotations_become_the_nearest_rotation(seed: int, noise: float) -> None:
     rng = np.random.default_rng(seed)
@@ -48,6 +52,7 @@ def test_rounded_rotations_become_the_nearest_rotation(seed: int, noise: float) 
     np.testing.assert_array_equal(repaired[:3, 3], T[:3, 3])
 
 
+@patient
 @given(seeds, st.floats(0.01, 100).filter(lambda scale: abs(scale - 1) > 0.05))
 def test_scaled_rotations_are_named_as_such(seed: int, scale: float) -> None:
     T = random_poses(np.random.default_rng(seed), 1)[0]
@@ -81,6 +86,7 @@ def test_broken_poses_say_why(matrix: object, clause: str) -> None:
     assert str(caught.value) == clause
 
 
+@patient
 @given(st.lists(st.floats(0, 100), min_size=1, max_size=30), st.floats(-10, 110))
 def test_nearest_time_is_nearest(times: list[float], time: float) -> None:
     ascending = np.sort(times)

@@ -5,13 +5,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from archive_writers import Recording, random_poses, recording, write_threerscan
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.camera import PinholeCamera, invert_rigid, is_rigid, transform_points
 from pipeline.errors import InputError
 from pipeline.readers import open_session
 from pipeline.readers.threerscan import upright_camera, upright_pose
+
+patient = settings(deadline=None)  # shared machines pause for longer than any deadline
 
 # The calibration of a real scan at a tenth of its size: depth pixels are not square.
 COLOUR = PinholeCamera(96, 54, 75.69, 75.62, 47.7, 26.4)
@@ -78,6 +80,7 @@ def test_world_points_are_those_of_the_stored_images(tmp_path: Path) -> None:
     assert (stored_m > 0).mean() > 0.7
 
 
+@patient
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_point_lands_on_the_turned_pixel(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -116,6 +119,34 @@ def test_packed_sequence_gives_the_same_frames(tmp_path: Path, prefix: str) -> N
         np.testing.assert_array_equal(frame.load_rgb(), colour)
         np.testing.assert_array_equal(frame.load_depth(), depth)
         np.testing.assert_array_equal(frame.T_world_camera, T)
+
+
+def test_archive_inside_an_archive_is_told(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "scan.zip", "w") as archive:
+        archive.writestr("sequence.zip", b"")
+
+    with pytest.raises(InputError) as caught:
+        open_session(tmp_path / "scan.zip")
+    assert str(caught.value) == (
+        f"{tmp_path}/scan.zip/sequence.zip is an archive inside an archive: unpack {tmp_path}/scan.zip"
+    )
+
+
+def test_frames_that_lack_a_file_are_left_out(tmp_path: Path) -> None:
+    write_threerscan(tmp_path, scan(4), COLOUR, DEPTH)
+    (tmp_path / "frame-000001.depth.pgm").unlink()
+    pgm = tmp_path / "frame-000002.depth.pgm"
+    pgm.write_bytes(pgm.read_bytes()[:-100])
+
+    session = open_session(tmp_path)
+
+    assert [frame.index for frame in session.frames] == [0, 2, 3]
+    assert session.warnings == (
+        f"{tmp_path}: frame frame-000001 is left out: depth image frame-000001.depth.pgm is missing",
+    )
+    with pytest.raises(InputError) as caught:
+        session.frames[1].load_depth()
+    assert str(caught.value) == f"{pgm} is not an image that can be decoded: copy the file again"
 
 
 def test_depth_shift_is_counts_per_metre(tmp_path: Path) -> None:
