@@ -22,7 +22,7 @@ from oasisview.access import GuardedServer
 
 T = TypeVar("T")
 
-WAIT_S = 20.0
+WAIT_S = 40.0
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 # Software WebGL, said explicitly: builds differ in what they fall back to.
 CHROMIUM_FLAGS = [

@@ -47,7 +47,7 @@ def chromium_page(browser: Browser, request: pytest.FixtureRequest) -> Iterator[
         context = browser.new_context(viewport={"width": width, "height": height}, **options)
         contexts.append(context)
         page = context.new_page()
-        page.set_default_timeout(20_000)
+        page.set_default_timeout(40_000)
         page.problems = []  # type: ignore[attr-defined]
         page.on("pageerror", lambda error: page.problems.append(str(error)))  # type: ignore[attr-defined]
         page.on(
@@ -86,7 +86,7 @@ def open_viewer(chromium_page: Callable[..., Page]) -> Callable[..., ViewerPage]
 
 
 def connected(server: GuardedServer, page: Page, before: set[int]) -> ViewerPage:
-    page.wait_for_function("() => window.__viserMutable && window.__viserMutable.canvas", timeout=30_000)
+    page.wait_for_function("() => window.__viserMutable && window.__viserMutable.canvas", timeout=60_000)
     # Viser's notice about software rendering covers what lies under it.
     page.add_style_tag(content="#webgl-software-rendering { display: none !important; }")
     new = wait_for(lambda: set(server.get_clients()) - before, "the tab to connect")

@@ -29,7 +29,7 @@ def band(keyframe: int, images: tuple[str, str] = ("red", "blue")) -> str:
         f'<input type="range" data-part="slider" data-send="scrub" min="0" max="40" value="{keyframe}">'
         f'<b data-part="title">kf {keyframe}</b>'
         + "".join(
-            f'<div data-part="image{k}" class="oa-pic" data-pixel="pixel" data-session="{k}" '
+            f'<div data-part="image{k}" data-pixel="pixel" data-session="{k}" '
             f'data-keyframe="{keyframe}" style="width:200px;height:100px;float:left">'
             f'<img src="/asset/{name}" style="width:100%;height:100%;object-fit:contain"></div>'
             for k, name in enumerate(images)
