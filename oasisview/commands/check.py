@@ -27,5 +27,10 @@ def run_command(arguments: argparse.Namespace) -> int:
     from pipeline.readers.check import check_archive
 
     found = check_archive(arguments.archive)
-    print(json.dumps(found.to_dict(), indent=2) if arguments.json else "\n".join(found.lines()))
+    if arguments.json:
+        print(json.dumps(found.to_dict(), indent=2))
+    if not found.usable:
+        raise InputError("; ".join(found.problems))
+    if not arguments.json:
+        print("\n".join(found.lines()))
     return 0

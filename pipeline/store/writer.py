@@ -34,7 +34,7 @@ from pipeline.result import (
 from pipeline.store.files import atomic_file, sync_tree, write_array, write_bytes, writing
 from pipeline.store.layout import SCHEMA_VERSION, SCORE_ARRAYS, ResultLayout
 from pipeline.store.lock import WriterLock
-from pipeline.store.opened import open_result, read_array
+from pipeline.store.opened import finished_result, open_result, read_array
 from pipeline.store.records import keyframe_to_dict, objects_to_dict, to_json
 from pipeline.store.swap import recover_interrupted_swap, swap_in
 from pipeline.store.versions import library_versions
@@ -65,6 +65,7 @@ class ResultWriter:
         self.partial = self.path.with_name(self.path.name + ".partial")
         self.layout = ResultLayout(self.partial / "result")
         self._work = self.partial / "work"
+        self._swapping = self._work / "swapping"
         if self.path.exists() and not ResultLayout(self.path).manifest.exists():
             raise InputError(f"{self.path} exists and is not a result", "choose another path for the result")
         with writing(self.partial):
@@ -73,7 +74,9 @@ class ResultWriter:
         try:
             with writing(self.partial):
                 recover_interrupted_swap(self.path)
-                if not self._has_this_key():
+                for unfinished in self.partial.rglob(".*.tmp"):  # of a writer that was killed
+                    unfinished.unlink()
+                if not self._can_be_resumed():
                     shutil.rmtree(self.layout.root, ignore_errors=True)
                     shutil.rmtree(self._work, ignore_errors=True)
             write_bytes(self._work / "key.json", to_json({"key": key, "schema_version": SCHEMA_VERSION}))
@@ -81,12 +84,15 @@ class ResultWriter:
             self._lock.release()
             raise
 
-    def _has_this_key(self) -> bool:
+    def _can_be_resumed(self) -> bool:
         try:
             record = json.loads((self._work / "key.json").read_bytes())
         except (OSError, ValueError):
             return False
-        return bool(record == {"key": self.key, "schema_version": SCHEMA_VERSION})
+        if record != {"key": self.key, "schema_version": SCHEMA_VERSION}:
+            return False
+        # A crash while swapping may have left the replaced result, or half of it, where ours was built.
+        return not self._swapping.exists() or finished_result(self.layout.root, self.key) is not None
 
     def __enter__(self) -> ResultWriter:
         return self
@@ -262,6 +268,7 @@ class ResultWriter:
         open_result(self.layout.root)  # a result that could not be opened must never replace one that can
         with writing(self.path):
             sync_tree(self.layout.root)
+            write_bytes(self._swapping, b"")
             swap_in(self.layout.root, self.path, self.key)
             shutil.rmtree(self.partial, ignore_errors=True)
         self._lock.release()

@@ -168,6 +168,14 @@ def test_result_of_another_schema(small_result_path: Path, capsys: pytest.Captur
     )
 
 
+def test_check_of_what_is_no_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, said = _said(capsys, "check", str(tmp_path))
+    assert code == 2
+    assert said.startswith(f"oasisview: {tmp_path} holds no recording of a known format: looked for ")
+    assert main(["check", str(tmp_path), "--json"]) == 2
+    assert json.loads(capsys.readouterr().out)["usable"] is False
+
+
 def test_bugs_give_code_1_and_a_traceback(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -219,7 +220,8 @@ def test_resumes_after_a_kill_between_stages(tmp_path: Path) -> None:
         writer = ResultWriter(sys.argv[1], "key")
         writer.save_array("surface", np.arange(4))
         writer.mark_stage("map_previous", {"keyframes": 7})
-        (writer.partial / "work/arrays/.half.npy.1.tmp").write_bytes(b"half")
+        (writer.partial / "result").mkdir()
+        (writer.partial / "result/.half.npy.1.tmp").write_bytes(b"half")
         os.kill(os.getpid(), signal.SIGKILL)
     """
     target = tmp_path / "r.oasis"
@@ -230,6 +232,7 @@ def test_resumes_after_a_kill_between_stages(tmp_path: Path) -> None:
         assert writer.stage_done("map_previous") and not writer.stage_done("map_current")
         assert writer.stage_info("map_previous") == {"keyframes": 7}
         assert writer.load_array("surface").tolist() == [0, 1, 2, 3]
+        assert list(writer.layout.root.iterdir()) == []
 
 
 def test_partial_of_another_key_is_discarded(tmp_path: Path) -> None:
@@ -248,6 +251,20 @@ def test_partial_of_another_key_is_discarded(tmp_path: Path) -> None:
 def test_a_finished_run_leaves_nothing_beside_the_result(tmp_path: Path) -> None:
     write_small_result(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["small.oasis"]
+
+
+def test_a_crash_after_the_swap_is_not_taken_for_a_half_done_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr("pipeline.store.writer.shutil.rmtree", lambda *_, **__: None)  # dies before tidying up
+        target = write_small_result(tmp_path)
+    assert (tmp_path / "small.oasis.partial/work/key.json").exists()
+    shutil.rmtree(target)
+    with ResultWriter(target, "small-fixture") as writer:
+        assert not (writer.partial / "work/swapping").exists()
+    write_small_result(tmp_path)
+    assert open_result(target).manifest["key"] == "small-fixture"
 
 
 def test_an_incomplete_result_does_not_replace_a_good_one(small_result_path: Path) -> None:
