@@ -11,7 +11,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from oasisview.events import Parser
+from oasisview.events import OWN_KINDS, Parser
 from pipeline.errors import OasisError
 
 T = TypeVar("T")
@@ -66,7 +66,12 @@ class EventQueue:
         try:
             fields = json.loads(message)
             kind = fields["k"]
-            registration = self._registered[kind]
+            registration = self._registered.get(kind)
+            if registration is None:
+                # What the page sends by itself may go unheard; anything else is a mistake or an attack.
+                level = logging.DEBUG if kind in OWN_KINDS else logging.WARNING
+                logger.log(level, "dropped an event of the unknown kind %.40r", kind)
+                return
             value = registration.parse(fields["v"])
         except RecursionError:
             logger.warning("dropped an event nested too deep")

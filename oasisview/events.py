@@ -15,6 +15,7 @@ T = TypeVar("T")
 Parser = Callable[[Any], T]
 
 MAX_TEXT_LENGTH = 500  # of what people write: notes and reasons
+OWN_KINDS = frozenset({"hello", "note", "undo", "swipe", "overview"})  # sent by the shell of every page
 
 
 def nothing(value: Any) -> None:

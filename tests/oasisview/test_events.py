@@ -127,7 +127,7 @@ def test_latest_only_skips_to_the_newest() -> None:
     assert handled == [49]
 
 
-def test_what_is_wrong_is_dropped() -> None:
+def test_what_is_wrong_is_dropped(caplog: pytest.LogCaptureFixture) -> None:
     handled: list[Any] = []
 
     async def run() -> None:
@@ -148,6 +148,9 @@ def test_what_is_wrong_is_dropped() -> None:
             '{"k": "text", "v": ' + "[" * 3000 + "]" * 3000 + "}",
         ):
             queue.receive(wrong)
+        assert len(caplog.records) == 12, "each is logged"
+        queue.receive(message("hello"))
+        assert len(caplog.records) == 12, "nobody has to listen to what pages send by themselves"
         queue.receive(message("text", "right"))
         await settled(queue)
         queue.close()
