@@ -46,9 +46,13 @@ def open_session(path: Path | str, settings: ArchiveSettings | None = None) -> S
 
 
 def _open_tree(path: Path, settings: ArchiveSettings) -> FileTree:
-    if path.is_dir():
+    try:
+        is_folder, exists = path.is_dir(), path.exists()
+    except OSError as error:
+        raise InputError(f"cannot open {path}: {error.strerror}") from None
+    if is_folder:
         return DirectoryTree(path)
-    if not path.exists():
+    if not exists:
         raise InputError(f"there is no archive {path}", "name a folder, .zip, .tar or .tar.gz")
     return open_packed(path, settings)
 

@@ -38,7 +38,9 @@ def number(values: Mapping[str, Any], key: str, where: str, default: float | Non
     Raises:
         InputError: missing without a default, or not a finite number.
     """
-    value = values.get(key, default)
+    value = values.get(key)
+    if value is None:
+        value = default
     if value is None:
         raise InputError(f"{where}: {key!r} is missing", "a number is expected")
     try:

@@ -176,7 +176,9 @@ def read_intrinsics(values: Mapping[str, Any], where: str) -> tuple[PinholeCamer
 
 def session_block(document: Mapping[str, Any], collector: FrameCollector) -> dict[str, Any]:
     """What the archive says about the visit; unusable values are dropped with a warning."""
-    block = document.get("session", {})
+    block = document.get("session")
+    if block is None:
+        return {}
     if not isinstance(block, dict):
         collector.warn(f"'session' in {TRANSFORMS} is ignored: it is not an object")
         return {}

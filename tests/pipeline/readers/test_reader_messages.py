@@ -310,6 +310,22 @@ def test_nothing_there(tmp_path: Path) -> None:
     assert str(caught.value) == f"there is no archive {tmp_path}/visit: name a folder, .zip, .tar or .tar.gz"
 
 
+def test_path_that_no_file_can_have() -> None:
+    with pytest.raises(InputError) as caught:
+        open_session("x" * 300)
+    assert str(caught.value) == f"cannot open {'x' * 300}: File name too long"
+
+
+def test_null_means_not_stated(tmp_path: Path) -> None:
+    document = write_nerfstudio(tmp_path, recording(2))
+    document.update(session=None, k1=None, depth_unit_scale_factor=None, ply_file_path=None)
+    save_transforms(tmp_path, document)
+
+    session = open_session(tmp_path)
+
+    assert (len(session.frames), session.warnings) == (2, ())
+
+
 def test_nothing_known_inside(tmp_path: Path) -> None:
     (tmp_path / "holiday.jpg").write_bytes(b"")
 
