@@ -1,4 +1,4 @@
-"""Hand-made scenes: faces of boxes and tilted sheets sampled on a voxel grid, with the owner of each voxel."""
+"""Hand-made scenes: faces of boxes and sheets of ground on a voxel grid, with the owner of each voxel."""
 
 from __future__ import annotations
 
