@@ -98,7 +98,7 @@ def best_nearby(
     offsets = np.arange(-radius, radius + 1)
     window_row = np.clip(row[:, None, None] + offsets[None, :, None], 0, rows - 1)
     window_column = np.clip(column[:, None, None] + offsets[None, None, :], 0, columns - 1)
-    window = (window_row * columns + window_column).reshape(len(visible), -1)
+    window = (window_row * columns + window_column).reshape(len(visible), len(offsets) ** 2)
     best = np.full(height * width, np.nan, np.float32)
     if len(visible):
         best[visible] = np.take_along_axis(correlation[visible], window, axis=1).max(axis=1)
