@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.synthetic import prints, textures
 from pipeline.synthetic.props import Prop, Workshop
-from pipeline.synthetic.shapes import Mesh, box, cylinder, join, lathe, sphere
+from pipeline.synthetic.shapes import Mesh, Outline, box, cylinder, join, lathe, sphere
 from pipeline.synthetic.textures import Colour
 
 _DARK = (38, 38, 42)
@@ -180,7 +180,7 @@ def bin_(shop: Workshop, colour: Colour) -> Prop:
     """A waste-paper bin."""
     tile = shop.tile(textures.cloth(shop.rng, [colour, shop.near(colour, 30)], shop.count(3, 10), 128))
     radius, height = shop.between(0.13, 0.17), shop.between(0.28, 0.38)
-    profile = [
+    profile: Outline = [
         [0, 0],
         [radius * 0.8, 0],
         [radius, height],
@@ -195,7 +195,7 @@ def bag(shop: Workshop, colour: Colour) -> Prop:
     """A rucksack: a rounded body with a pocket."""
     tile = shop.tile(textures.cloth(shop.rng, [colour, shop.near(colour, 50)], shop.count(0, 7), 128))
     pocket = shop.tile(prints.picture(shop.rng, 64))
-    profile = [[0, 0], [0.15, 0.01], [0.17, 0.12], [0.16, 0.3], [0.1, 0.41], [0, 0.44]]
+    profile: Outline = [[0, 0], [0.15, 0.01], [0.17, 0.12], [0.16, 0.3], [0.1, 0.41], [0, 0.44]]
     body = lathe(profile, tile, 0.4, 16, smooth=True)
     front = box((-0.1, -0.2, 0.05), (0.1, -0.1, 0.24), [tile, tile, pocket, tile, tile, tile], None)
     return Prop("bag", join([body, front]), lambda: bag(shop, shop.near(colour)))

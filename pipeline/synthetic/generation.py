@@ -57,8 +57,8 @@ def generate(
         sensor: noise of depth, image and poses; None = the scene's own.
 
     Raises:
-        InputError: an unknown scene, too few frames, or a folder that is not empty.
-        StorageError: the folder cannot be written.
+        InputError: an unknown scene, too few frames, a folder that is not empty or cannot be made.
+        StorageError: writing failed on the way (disk full); nothing is left behind.
     """
     out = Path(out)
     if frames < 2:
@@ -71,12 +71,15 @@ def generate(
     unfinished = out.with_name(f".{out.name}.{os.getpid()}.part")
     try:
         unfinished.mkdir(parents=True)
+    except OSError as error:
+        raise InputError(f"cannot write {out}: {error.strerror or error}", "choose another place") from None
+    try:
         record(drawn, unfinished, sensor or drawn.sensor, report)
         if out.exists():
             out.rmdir()
         unfinished.rename(out)
     except OSError as error:
-        raise StorageError(f"cannot write {out}: {error.strerror or error}", "choose another place") from None
+        raise StorageError(f"writing {out} failed: {error.strerror or error}") from None
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
 

@@ -49,7 +49,15 @@ def drum(shop: Workshop, colour: Colour, radius: float = 0.29, height: float = 0
         textures.blot(shop.rng, face, (120, 70, 40))
     tile = shop.tile(face, gloss=0.12)
     r, h, rib = radius, height, radius * 1.03
-    profile = [[0, 0], [rib, 0], [rib, 0.02], [r, 0.04], [r, h * 0.33], [rib, h * 0.35], [r, h * 0.37]]
+    profile: list[list[float]] = [
+        [0, 0],
+        [rib, 0],
+        [rib, 0.02],
+        [r, 0.04],
+        [r, h * 0.33],
+        [rib, h * 0.35],
+        [r, h * 0.37],
+    ]
     profile += [[r, h * 0.64], [rib, h * 0.66], [r, h * 0.68], [r, h - 0.04], [rib, h - 0.02], [rib, h]]
     profile += [[r * 0.95, h], [r * 0.95, h - 0.02], [0, h - 0.02]]
     return Prop(

@@ -66,7 +66,7 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
     lasting += [street.tree(shop, shop.between(3.6, 5.5)) for _ in range(shop.count(3, 6))]
     lasting += [street.lamppost(shop, shop.between(3.2, 4.2)) for _ in range(shop.count(3, 5))]
     lasting += [street.bench(shop, shop.between(1.6, 2.2)) for _ in range(shop.count(3, 5))]
-    passing = [market_thing(shop, colours) for _ in range(shop.count(30, 40))]
+    passing = [market_thing(shop, colours) for _ in range(shop.count(38, 48))]
     passing.sort(key=lambda prop: -prop.radius)
     # The camera walks round the square: the ring of its path stays free of things.
     inner = (width / 2 - 5.2, depth / 2 - 5.2)
@@ -85,15 +85,15 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
         else:
             spots.append((T, thing))
     arriving = rng.random() < 0.5
-    shares = {"appeared": 0.55, "disappeared": 0.08} if arriving else {"appeared": 0.08, "disappeared": 0.55}
-    dealt = fates(rng, len(spots), moved=0.12, spare=0.1, replaced=0.06, **shares)
+    shares = {"appeared": 0.45, "disappeared": 0.07} if arriving else {"appeared": 0.07, "disappeared": 0.45}
+    dealt = fates(rng, len(spots), moved=0.16, spare=0.14, replaced=0.07, **shares)
     free = [(T, thing.radius) for (T, thing), fate in zip(spots, dealt, strict=True) if fate == "spare"]
     for (T, thing), fate in zip(spots, dealt, strict=True):
         if fate == "spare":
             continue
         goal = None
         if fate == "moved":
-            fits = [i for i, (_, radius) in enumerate(free) if radius > thing.radius - 0.4]
+            fits = [i for i, (_, radius) in enumerate(free) if radius > thing.radius * 0.75]
             goal = free.pop(fits[0])[0] if fits else None
         plan.deal(fate, thing, T, goal, nudge(rng, 0.05, 0.03))
 

@@ -164,7 +164,7 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
             shop.between(-room_x, room_x + 1e-9), shop.between(-room_y, room_y + 1e-9), 0, yaw
         )
         spots.append((T, thing, is_shelf))
-    _deal_spots(plan, rng, [s for s in spots if not s[2]], moved=0.17)
+    _deal_spots(plan, rng, [s for s in spots if not s[2]], moved=shop.between(0.1, 0.24))
     _deal_spots(plan, rng, [s for s in spots if s[2]], moved=0.08)
 
     # On the floor, inside the ring of furniture.

@@ -210,4 +210,5 @@ def _towards(lamp: Lamp, points: NDArray[np.float32]) -> tuple[NDArray[np.float3
     offset = lamp.position.astype(np.float32) - points
     distance = np.sqrt(_dot(offset, offset))
     arriving = 1 / (1 + (distance / np.float32(lamp.reach)) ** 2)
-    return offset / np.maximum(distance, np.float32(1e-6))[:, None], arriving.astype(np.float32, copy=False)
+    offset /= np.maximum(distance, np.float32(1e-6))[:, None]
+    return offset, arriving.astype(np.float32, copy=False)

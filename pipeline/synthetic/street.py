@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.synthetic import goods, prints, textures
 from pipeline.synthetic.props import Prop, Workshop
-from pipeline.synthetic.shapes import Mesh, box, cylinder, join, lathe, prism, sphere
+from pipeline.synthetic.shapes import Mesh, Outline, box, cylinder, join, lathe, prism, sphere
 from pipeline.synthetic.textures import Colour
 
 
@@ -129,7 +129,7 @@ def fountain(shop: Workshop, radius: float) -> Prop:
     """A round basin with a column and a bowl."""
     stone = shop.tile(textures.speckled(shop.rng, shop.near((168, 160, 146), 14), 0.25, 256))
     water = shop.tile(textures.mottled(shop.rng, (70, 100, 104), 0.25, 1.5), gloss=0.4)
-    profile = [[0, 0], [radius, 0], [radius, 0.5], [radius - 0.25, 0.5], [radius - 0.25, 0.36]]
+    profile: Outline = [[0, 0], [radius, 0], [radius, 0.5], [radius - 0.25, 0.5], [radius - 0.25, 0.36]]
     parts = [
         lathe(profile, stone, 1.2, 28),
         lathe([[radius - 0.25, 0.37], [0, 0.37]], water, 1.5, 28),

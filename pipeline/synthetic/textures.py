@@ -6,11 +6,13 @@ Every function returns an (S, S, 3) uint8 sRGB tile. Colours are RGB triples in 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from itertools import pairwise
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft2, rfft2
 
 Tile = NDArray[np.uint8]
 Colour = Sequence[float] | NDArray[np.float64]
@@ -26,13 +28,19 @@ def noise(rng: np.random.Generator, size: int, slope: float = 1.2, stretch: floa
         slope: amplitude falls with frequency to this power; 0 = white.
         stretch: grain: features are this many times longer along the rows.
     """
+    white = rng.standard_normal((size, size), dtype=np.float32)
+    field = irfft2(rfft2(white) * _falloff(size, slope, stretch), s=(size, size))
+    return (field / max(float(field.std()), 1e-9)).astype(np.float32)
+
+
+@lru_cache(maxsize=64)
+def _falloff(size: int, slope: float, stretch: float) -> FloatMap:
+    """Amplitude of each frequency of a real FFT, (size, size // 2 + 1); zero for the mean."""
     frequency_y = np.fft.fftfreq(size)[:, None] * size
     frequency_x = np.fft.rfftfreq(size)[None, :] * size * stretch
     radius = np.hypot(frequency_y, frequency_x)
     radius[0, 0] = np.inf
-    spectrum = np.fft.rfft2(rng.standard_normal((size, size))) / radius**slope
-    field = np.fft.irfft2(spectrum, s=(size, size))
-    return (field / max(field.std(), 1e-9)).astype(np.float32)
+    return (radius**-slope).astype(np.float32)
 
 
 def mottled(
