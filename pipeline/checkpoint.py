@@ -13,6 +13,7 @@ from pipeline.camera import PinholeCamera
 from pipeline.change.observation import Observation
 from pipeline.change.observe import MutualObservation
 from pipeline.correspondence.compare import Comparison
+from pipeline.correspondence.place_similarity import PlaceSimilarity
 from pipeline.mapping.front_end import MappedKeyframe, SessionGeometry
 from pipeline.mapping.keyframe_store import KeyframeStore
 from pipeline.mapping.objects import SessionObjects
@@ -140,12 +141,27 @@ def save_comparison(writer: ResultWriter, comparison: Comparison) -> None:
     for name in _EVIDENCE:
         stacked = np.stack([getattr(evidence, name) for evidence in comparison.evidence])
         writer.save_array(f"comparison/{name}", stacked)
+    for visit, similarity in enumerate((comparison.similarity0, comparison.similarity1)):
+        writer.save_array(f"comparison/similarity_total_{visit}", np.stack([s.total for s in similarity]))
+        writer.save_array(f"comparison/similarity_count_{visit}", np.stack([s.count for s in similarity]))
     writer.save_array("comparison/light", np.zeros(0) if comparison.light is None else comparison.light)
 
 
 def load_comparison(writer: ResultWriter) -> Comparison:
     """What ``save_comparison`` kept."""
-    stacks = [writer.load_array(f"comparison/{name}", mmap=False) for name in _EVIDENCE]
-    light = writer.load_array("comparison/light", mmap=False)
-    evidence = tuple(MatchEvidence(*parts) for parts in zip(*stacks, strict=True))
-    return Comparison(evidence, light if light.size else None)
+
+    def load(name: str) -> NDArray[Any]:
+        return writer.load_array(f"comparison/{name}", mmap=False)
+
+    evidence = tuple(MatchEvidence(*parts) for parts in zip(*map(load, _EVIDENCE), strict=True))
+    similarity = [
+        tuple(
+            PlaceSimilarity(total, count)
+            for total, count in zip(
+                load(f"similarity_total_{visit}"), load(f"similarity_count_{visit}"), strict=True
+            )
+        )
+        for visit in range(2)
+    ]
+    light = load("light")
+    return Comparison(evidence, similarity[0], similarity[1], light if light.size else None)

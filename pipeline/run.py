@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -10,6 +11,7 @@ from contextlib import contextmanager
 from functools import partial
 from hashlib import blake2b
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -276,6 +278,8 @@ class _Run:
                 up_world=geometry.surface.up_world,
                 keyframes=_keyframe_records(geometry, covisible[visit]),
             )
+            evidence = (conclusion.previous, conclusion.current)[visit]
+            self._writer.write_evidence(visit, evidence.objects.table(evidence.log_odds))
         self._writer.write_objects(
             assembled.objects, assembled.replaced, assembled.score_matrix, assembled.belief
         )
@@ -356,3 +360,12 @@ def _keyframe_records(
         )
         for k, keyframe in enumerate(geometry.keyframes)
     ]
+
+
+class _CallableModule(ModuleType):
+    """Importing ``pipeline.run`` puts this module where ``pipeline.run(...)`` looks for the function."""
+
+    __call__ = staticmethod(run)
+
+
+sys.modules[__name__].__class__ = _CallableModule

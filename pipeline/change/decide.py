@@ -19,6 +19,8 @@ from pipeline.change.evidence import object_evidence
 from pipeline.change.observation import Observation
 from pipeline.change.observe import MutualObservation
 from pipeline.correspondence.compare import Comparison, VisitImages
+from pipeline.correspondence.heatmaps import change_of_similarity
+from pipeline.correspondence.place_similarity import PlaceSimilarity
 from pipeline.perception.protocols import FeatureExtractor
 from pipeline.settings import Settings
 
@@ -55,14 +57,20 @@ def decide(
     nearest0, nearest1 = _nearest(previous, current), _nearest(current, previous)
     search = _Search(previous, current, extractor, comparison.light, settings)
     seen_so_far = Observation(len(previous.geometry.surface.points_world))
+    similarity = (PlaceSimilarity.empty(previous.objects.count), PlaceSimilarity.empty(current.objects.count))
     last_keyframe = _last_keyframes(current)
     decisions: list[Decision] = []
     for submap, local in enumerate(comparison.evidence):
         association.add_submap(local)
         seen_so_far.add_sparse(observation.by_submap[submap])
+        similarity[0].merge(comparison.similarity0[submap])
+        similarity[1].merge(comparison.similarity1[submap])
         is_met = current.geometry.first_keyframe <= last_keyframe[submap]
-        evidence0, scale0 = _visit_evidence(previous, seen_so_far, None, settings)
-        evidence1, scale1 = _visit_evidence(current, observation.of_current, is_met, settings)
+        dissimilarity = [change_of_similarity(s.mean, extractor.similarity) for s in similarity]
+        evidence0, scale0 = _visit_evidence(previous, seen_so_far, None, dissimilarity[0], settings)
+        evidence1, scale1 = _visit_evidence(
+            current, observation.of_current, is_met, dissimilarity[1], settings
+        )
         if settings.change.rule == "paper":
             decision = decide_by_association(
                 evidence0, evidence1, association, settings.change, is_final=submap + 1 == len(last_keyframe)
@@ -99,7 +107,11 @@ def _nearest(own: VisitImages, other: VisitImages) -> NDArray[np.int32]:
 
 
 def _visit_evidence(
-    visit: VisitImages, seen: Observation, is_met: NDArray[np.bool_] | None, settings: Settings
+    visit: VisitImages,
+    seen: Observation,
+    is_met: NDArray[np.bool_] | None,
+    dissimilarity: NDArray[np.float64],
+    settings: Settings,
 ) -> tuple[VisitEvidence, float]:
     surface = visit.geometry.surface
     if is_met is None:
@@ -121,6 +133,7 @@ def _visit_evidence(
         visit.geometry.log_colours,
         surface.normals_world,
         surface.points_world,
+        dissimilarity,
     )
     log_odds = change_log_odds(evidence, appearance.scale, settings.change)
     return VisitEvidence(evidence, log_odds, evidence.voxel_count > 0), appearance.scale

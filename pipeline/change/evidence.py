@@ -33,6 +33,8 @@ class ObjectEvidence:
         texture: spread of the object's own log brightness within its faces.
         texture_correlation: of its brightness pattern in the two visits, within faces; 1 where not compared.
         centroid_world: (K + 1, 3) metres.
+        dissimilarity: how unlike the object's patches are to those at the same place in the other visit, on
+            the scale of the semantic heatmap (log odds); NaN where no keyframe compared it.
     """
 
     voxel_count: NDArray[np.int64]
@@ -44,6 +46,26 @@ class ObjectEvidence:
     texture: NDArray[np.float64]
     texture_correlation: NDArray[np.float64]
     centroid_world: NDArray[np.float64]
+    dissimilarity: NDArray[np.float64]
+
+    def table(self, log_odds: NDArray[np.float64]) -> NDArray[np.void]:
+        """(K,) one row per instance (background left out): what thresholds and weights apply to."""
+        columns = {
+            "voxel_count": self.voxel_count,
+            "coverage": self.coverage,
+            "seen_through": self.seen_through,
+            "compared_count": self.compared_count,
+            "median_residual": self.median_residual,
+            "tail_share": self.tail_share,
+            "texture": self.texture,
+            "texture_correlation": self.texture_correlation,
+            "dissimilarity": self.dissimilarity,
+            "log_odds": log_odds,
+        }
+        rows = np.zeros(len(log_odds) - 1, [(name, np.float32) for name in columns])
+        for name, values in columns.items():
+            rows[name] = values[1:]
+        return rows
 
     @property
     def texture_weight(self) -> NDArray[np.float64]:
@@ -61,6 +83,7 @@ def object_evidence(
     own_log_colours: NDArray[np.float32],
     normals_world: NDArray[np.float32],
     points_world: NDArray[np.float32],
+    dissimilarity: NDArray[np.float64],
 ) -> ObjectEvidence:
     """Gather the evidence of all instances.
 
@@ -71,6 +94,7 @@ def object_evidence(
         is_observed, is_seen_through: (M,) by the other visit.
         appearance: colour residual against the other visit.
         own_log_colours, normals_world, points_world: (M, 3) of the surface.
+        dissimilarity: (K + 1,) from the compared keyframes.
     """
     size = count + 1
     owner = np.where(is_met, instance_of_voxel, 0)
@@ -110,6 +134,7 @@ def object_evidence(
         texture=texture,
         texture_correlation=correlation,
         centroid_world=centroid,
+        dissimilarity=dissimilarity,
     )
 
 

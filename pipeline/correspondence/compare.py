@@ -16,6 +16,7 @@ from pipeline.association.aggregation import MatchEvidence, patch_owners
 from pipeline.correspondence.covisibility import CovisibilityIndex, PatchView, patch_view, patch_warp
 from pipeline.correspondence.heatmaps import geometric_heatmap, semantic_heatmap
 from pipeline.correspondence.matching import best_nearby, match
+from pipeline.correspondence.place_similarity import PlaceSimilarity
 from pipeline.errors import SceneMismatchError
 from pipeline.mapping.front_end import SessionGeometry
 from pipeline.mapping.objects import SessionObjects
@@ -92,10 +93,13 @@ class Comparison:
 
     Attributes:
         evidence: (submaps of the current visit) match evidence of each.
+        similarity0, similarity1: (submaps) how alike the places of the previous, current objects look.
         light: mean lighting difference of the visits, as the extractor gives it; None without any.
     """
 
     evidence: tuple[MatchEvidence, ...]
+    similarity0: tuple[PlaceSimilarity, ...]
+    similarity1: tuple[PlaceSimilarity, ...]
     light: NDArray[np.float64] | None
 
 
@@ -125,7 +129,9 @@ def compare(
     best = (_BestSimilarity(covisibility.views0), _BestSimilarity(covisibility.views1))
     owners = (_PatchOwners(previous), _PatchOwners(current))
     counts = (previous.objects.count, current.objects.count)
-    evidence = [MatchEvidence.empty(*counts) for _ in range(current.geometry.submap_count)]
+    submaps = range(current.geometry.submap_count)
+    evidence = [MatchEvidence.empty(*counts) for _ in submaps]
+    similarity = [[PlaceSimilarity.empty(count) for _ in submaps] for count in counts]
     lights = []
     steps = len(pairs) + len(previous.geometry.keyframes) + len(current.geometry.keyframes)
     for step, (k0, k1) in enumerate(pairs):
@@ -137,9 +143,13 @@ def compare(
         shape0, shape1 = stored0.shape[:2], stored1.shape[:2]
         write_links(k0, k1, matches.links(shape0, shape1))
         p, q, score = matches.correspondences()
-        evidence[current.geometry.keyframes[k1].submap].add(owners[0](k0)[p], owners[1](k1)[q], score)
-        best[1].add(k1, best_nearby(matches.correlation.T, into_previous, shape0, radius))
-        best[0].add(k0, best_nearby(matches.correlation, patch_warp(view0, view1), shape1, radius))
+        submap = current.geometry.keyframes[k1].submap
+        evidence[submap].add(owners[0](k0)[p], owners[1](k1)[q], score)
+        nearby0 = best_nearby(matches.correlation, patch_warp(view0, view1), shape1, radius)
+        nearby1 = best_nearby(matches.correlation.T, into_previous, shape0, radius)
+        for visit, (k, nearby) in enumerate(((k0, nearby0), (k1, nearby1))):
+            best[visit].add(k, nearby)
+            similarity[visit][submap].add(owners[visit](k), nearby.reshape(-1))
         lights.append(light)
         on_step(step + 1, steps)
     done = len(pairs)
@@ -154,7 +164,7 @@ def compare(
             done += 1
             on_step(done, steps)
     mean_light = np.mean(lights, axis=0) if lights and lights[0].size else None
-    return Comparison(tuple(evidence), mean_light)
+    return Comparison(tuple(evidence), tuple(similarity[0]), tuple(similarity[1]), mean_light)
 
 
 def _geometric(

@@ -9,6 +9,11 @@ from numpy.typing import NDArray
 from pipeline.perception.protocols import SimilarityScale
 
 
+def change_of_similarity(correlation: NDArray[np.floating], scale: SimilarityScale) -> NDArray[np.float64]:
+    """Log odds of a change from a correlation, on the descriptor's own scale; NaN stays NaN."""
+    return np.clip((scale.threshold - np.asarray(correlation, np.float64)) / scale.softness, -30, 30)
+
+
 def semantic_heatmap(
     best_correlation: NDArray[np.float32], scale: SimilarityScale, sigma_patches: float
 ) -> NDArray[np.float32]:
@@ -29,7 +34,7 @@ def semantic_heatmap(
         score = cv2.GaussianBlur(score, (0, 0), sigma_patches)
         weight = cv2.GaussianBlur(weight, (0, 0), sigma_patches)
     smoothed = score / np.maximum(weight, 1e-6)
-    change = 1.0 / (1.0 + np.exp(np.clip((smoothed - scale.threshold) / scale.softness, -30, 30)))
+    change = 1.0 / (1.0 + np.exp(-change_of_similarity(smoothed, scale)))
     return np.where(visible, change, np.nan).astype(np.float32)
 
 

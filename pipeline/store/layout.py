@@ -49,6 +49,10 @@ class ResultLayout:
         """One array of a visit's map: points_world, colours or object_ids."""
         return self.session(session) / f"{name}.npy"
 
+    def evidence(self, session: int) -> Path:
+        """Raw evidence of a visit's instances, one structured row each."""
+        return self.session(session) / "evidence.npy"
+
     def image(self, session: int, frame_index: int) -> Path:
         """JPEG of a keyframe."""
         return self.session(session) / "images" / f"{frame_index:05d}.jpg"

@@ -122,6 +122,11 @@ class StoredSession:
             raise ResultError(f"{path} is not a readable mask", f"the result is damaged, {_RUN_AGAIN}")
         return np.asarray(mask, dtype=np.uint16)
 
+    @property
+    def evidence(self) -> NDArray[np.void]:
+        """(K,) raw evidence of every instance, fields as in ``pipeline.change.evidence``."""
+        return read_array(self.layout.evidence(self.index))
+
     def semantic_heatmap(self, k: int) -> NDArray[np.float32]:
         """(H_f, W_f) in [0, 1], NaN = not co-visible."""
         path = self.layout.semantic(self.index, self.keyframes[k].frame_index)
