@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.camera import PinholeCamera
+from pipeline.store.files import write_arrays
 
 MAX_SPLAT_RADIUS_PX = 3
 _NEAR_M = 0.05
@@ -38,7 +39,7 @@ class AccumulatedSubmap:
     def save(self, path: Path) -> None:
         """Write the points, one per voxel of the whole submap."""
         points = np.concatenate(self._points) if self._points else np.zeros((0, 3), np.float32)
-        np.savez(path, points_world=_one_per_cell(points, self._voxel_size_m))
+        write_arrays(path, points_world=_one_per_cell(points, self._voxel_size_m))
 
 
 def splat_depth(

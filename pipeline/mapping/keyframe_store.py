@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.store.files import write_array, writing
+
 MAX_STORED_DEPTH_M = 65.0
 
 
@@ -21,7 +23,8 @@ class KeyframeStore:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        folder.mkdir(parents=True, exist_ok=True)
+        with writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
         self.remap: NDArray[np.int32] | None = None
 
     def _path(self, kind: str, k: int) -> Path:
@@ -31,9 +34,9 @@ class KeyframeStore:
         self, k: int, depth: NDArray[np.float32], rgb: NDArray[np.uint8], raw_voxels: NDArray[np.int32]
     ) -> None:
         """Store depth (h, w) metres, blurred colour (h, w, 3) and raw voxel numbers (h, w), -1 = none."""
-        np.save(self._path("depth", k), np.round(depth * 1000).astype(np.uint16))
-        np.save(self._path("rgb", k), rgb)
-        np.save(self._path("voxels", k), raw_voxels)
+        write_array(self._path("depth", k), np.round(depth * 1000).astype(np.uint16))
+        write_array(self._path("rgb", k), rgb)
+        write_array(self._path("voxels", k), raw_voxels)
 
     def depth(self, k: int) -> NDArray[np.float32]:
         """(h, w) metres, 0 = no measurement."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.camera import PinholeCamera, invert_rigid
 from pipeline.mapping.accumulation import splat_depth
+from pipeline.store.files import write_arrays
 
 BLOCK_RESOLUTION = 8
 _CACHED_SUBMAPS = 8
@@ -72,7 +73,7 @@ class TsdfSubmap:
         order = np.lexsort(keys.T[::-1])
         tsdf = self._volume.attribute("tsdf")[slots].numpy()[order]
         weight = self._volume.attribute("weight")[slots].numpy()[order]
-        np.savez(path, blocks=keys[order], tsdf=tsdf, weight=weight)
+        write_arrays(path, blocks=keys[order], tsdf=tsdf, weight=weight)
 
 
 class SubmapSurfaces:

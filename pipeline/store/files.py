@@ -27,6 +27,7 @@ _HINTS = {
     errno.EPERM: ("permission denied", "choose a folder that you may write to"),
     errno.EROFS: ("the file system is read-only", "choose a folder that you may write to"),
     errno.ENOTDIR: ("a file is in the way", "choose another path"),
+    errno.ENOENT: ("there is no such folder, and it cannot be made", "choose another path"),
     errno.EEXIST: ("a file is in the way", "choose another path"),
     errno.ENAMETOOLONG: ("the name is too long", "choose a shorter one"),
 }
@@ -83,6 +84,15 @@ def write_array(path: Path, array: NDArray[Any]) -> None:
         # Not np.save: its C writer loses errno, and with it the difference between a full disk and others.
         if array.size:
             file.write(array.data)
+
+
+def write_arrays(path: Path, **arrays: NDArray[Any]) -> None:
+    """Write an ``.npz`` atomically; the same arrays give the same bytes; object arrays are refused."""
+    for name, array in arrays.items():
+        if np.asarray(array).dtype.hasobject:
+            raise ValueError(f"{name} of {path.name}: object arrays would need pickle")
+    with atomic_file(path) as file:
+        np.savez(file, **arrays)
 
 
 def sync_tree(root: Path) -> None:

@@ -31,7 +31,7 @@ from pipeline.result import (
     Result,
     ScoreMatrix,
 )
-from pipeline.store.files import atomic_file, sync_tree, write_array, write_bytes, writing
+from pipeline.store.files import sync_tree, write_array, write_arrays, write_bytes, writing
 from pipeline.store.layout import SCHEMA_VERSION, SCORE_ARRAYS, ResultLayout
 from pipeline.store.lock import WriterLock
 from pipeline.store.opened import finished_result, open_result, read_array
@@ -177,16 +177,15 @@ class ResultWriter:
 
     def write_links(self, previous_frame: int, current_frame: int, links: PatchLinks) -> None:
         """Patch matches of a pair, named by the archive frame indices of its keyframes."""
-        with atomic_file(self.layout.links(previous_frame, current_frame)) as file:
-            np.savez(
-                file,
-                forward=links.forward.astype(np.uint16),
-                forward_score=links.forward_score.astype(np.float16),
-                backward=links.backward.astype(np.uint16),
-                backward_score=links.backward_score.astype(np.float16),
-                previous_shape=np.array(links.previous_shape, dtype=np.int32),
-                current_shape=np.array(links.current_shape, dtype=np.int32),
-            )
+        write_arrays(
+            self.layout.links(previous_frame, current_frame),
+            forward=links.forward.astype(np.uint16),
+            forward_score=links.forward_score.astype(np.float16),
+            backward=links.backward.astype(np.uint16),
+            backward_score=links.backward_score.astype(np.float16),
+            previous_shape=np.array(links.previous_shape, dtype=np.int32),
+            current_shape=np.array(links.current_shape, dtype=np.int32),
+        )
 
     def write_session(
         self,
@@ -221,6 +220,10 @@ class ResultWriter:
         write_array(self.layout.map_array(session, "points_world"), points_world.astype(np.float32))
         write_array(self.layout.map_array(session, "colours"), colours.astype(np.uint8))
         write_array(self.layout.map_array(session, "object_ids"), object_ids.astype(np.int32))
+
+    def write_evidence(self, session: int, evidence: NDArray[np.void]) -> None:
+        """(K,) structured rows of raw evidence, in instance order."""
+        write_array(self.layout.evidence(session), evidence)
 
     def write_objects(
         self,
