@@ -11,6 +11,7 @@ import threading
 import time
 import webbrowser
 from pathlib import Path
+from typing import Protocol
 
 import viser
 
@@ -18,7 +19,7 @@ from oasisview import events
 from oasisview.access import GuardedServer
 from oasisview.assets import AssetTable
 from oasisview.inspector import Inspector
-from oasisview.job import Job, JobState, RunningJob, start_job
+from oasisview.job import Job, JobState, start_job
 from oasisview.panels.progress import message_html, progress_html
 from oasisview.shell import Shell
 from oasisview.workbench import Workbench
@@ -30,6 +31,18 @@ PROGRESS_S = 0.3
 _log = logging.getLogger(__name__)
 
 
+class FollowedJob(Protocol):
+    """A job at work, as the page follows it (``RunningJob``)."""
+
+    job: Job
+
+    def events(self) -> JobState:
+        """The latest state."""
+
+    def cancel(self) -> None:
+        """Stop it; harmless when it is over."""
+
+
 class RunningApp:
     """A viewer that is being served.
 
@@ -38,7 +51,7 @@ class RunningApp:
     """
 
     def __init__(
-        self, source: Path | Job | RunningJob, *, host: str, port: int, token: str | None = None
+        self, source: Path | Job | FollowedJob, *, host: str, port: int, token: str | None = None
     ) -> None:
         """Open the result or start the job, then serve; ``start`` reads better."""
         # A wrong path is told in the terminal before anything listens.
@@ -50,7 +63,7 @@ class RunningApp:
         self._pages: dict[int, _Page] = {}
         self._bench: Workbench | None = None
         self._message = ("Opening the result", "Large maps take some seconds.")
-        self._job = source if isinstance(source, RunningJob) else None
+        self._job = source if not isinstance(source, Path | Job) else None
         self._started = time.monotonic()
         self.url = self._server.url
         self.login_url = self._server.login_url
@@ -236,7 +249,7 @@ class _Page:
 
 
 def start(
-    source: Path | Job | RunningJob, *, host: str = "127.0.0.1", port: int = 8080, token: str | None = None
+    source: Path | Job | FollowedJob, *, host: str = "127.0.0.1", port: int = 8080, token: str | None = None
 ) -> RunningApp:
     """Serve a result, or a job and then its result, and return at once; stop it with ``.stop()``.
 

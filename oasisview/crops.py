@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from oasisview.scene.outlines import box_corners
 from pipeline.camera import PinholeCamera, invert_rigid, transform_points
 from pipeline.result import PatchLinks
-from oasisview.scene.outlines import box_corners
 
 CROP_ASPECT = 4 / 3
 

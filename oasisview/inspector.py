@@ -90,9 +90,14 @@ class Inspector:
             bench.points,
             self._decisions.label_of,
             LABEL_RGB,
-            on_object=lambda object_id: self.select(object_id),
+            on_object=self.select,
             on_keyframe=self.show_keyframe,
         )
+
+    @property
+    def client_id(self) -> int:
+        """Viser's number of the tab."""
+        return self._client.client_id
 
     @property
     def user(self) -> str:

@@ -10,11 +10,12 @@ from scipy import ndimage
 from oasisview import crops, wording
 from oasisview.catalogue import Catalogue
 from oasisview.heatmap_colours import CIVIDIS, GEOMETRIC_RANGE_M, geometric_anchors, gradient_css
-from oasisview.panels.markup import key, sends
+from oasisview.panels.markup import empty, key, sends
 from oasisview.shell import escape
 from oasisview.wording import LABEL_NAMES
 from pipeline.result import ChangeLabel
 
+PREVIOUS_SIGN, NEXT_SIGN = "\u25c0", "\u25b6"
 LabelOf = Callable[[int], ChangeLabel]
 
 
@@ -30,7 +31,7 @@ def band_html(
     """The band for a keyframe of a visit; what changes while scrubbing carries ``data-part``."""
     visit = catalogue.session(session)
     if not visit.keyframes:
-        return f'<div class="oa oa-band"><div class="oa-empty">{escape(visit.name)} holds no keyframe.</div></div>'
+        return f'<div class="oa-band">{empty(f"{visit.name} holds no keyframe.")}</div>'
     pair = catalogue.covisible(session, keyframe)
     other = 1 - session
     record = visit.keyframes[keyframe]
@@ -39,13 +40,9 @@ def band_html(
         _image(catalogue, "this", this_word, f"kf {keyframe + 1}", session, keyframe, selected, label_of)
     ]
     if pair is None:
-        empty = f'<div class="oa-empty">{wording.NO_SHARED_VIEW}</div>'
-        for part, title in (
-            ("other", other_word),
-            ("semantic", "Looks different"),
-            ("geometric", "Shape different"),
-        ):
-            pictures.append(_figure(part, title, "", f'<div class="oa-pic">{empty}</div>', ""))
+        nothing = f'<div class="oa-pic">{empty(wording.NO_SHARED_VIEW)}</div>'
+        titles = {"other": other_word, "semantic": "Looks different", "geometric": "Shape different"}
+        pictures += [_figure(part, title, "", nothing, "") for part, title in titles.items()]
     else:
         note = f"kf {pair.other_keyframe + 1} \u00b7 {wording.percent(pair.shared)} shared"
         pictures.append(
@@ -55,7 +52,7 @@ def band_html(
         pictures.append(_heatmap(catalogue, "geometric", session, keyframe, selected, label_of, dark=dark))
     title = f"frame {record.frame_index} of the recording, submap {record.submap + 1}"
     return (
-        f'<div class="oa oa-band" data-session="{session}" data-keyframe="{keyframe}">'
+        f'<div class="oa-band" data-session="{session}" data-keyframe="{keyframe}">'
         f"{_scrubber(catalogue, session, keyframe, selected, title)}"
         f'<div class="oa-pictures">{"".join(pictures)}</div></div>'
     )
@@ -68,11 +65,11 @@ def _scrubber(catalogue: Catalogue, session: int, keyframe: int, selected: int |
         f'title="Step through {escape(catalogue.session(s).name)}">{wording.visit_word(s)}</button>'
         for s in (0, 1)
     )
-    step = f'data-part="step" class="oa-steps"'
+    best_tip = "The keyframe that shows the selected object best"
     return (
         '<div class="oa-scrub">'
         f'<span class="oa-segments" data-part="visit" role="group" aria-label="Visit">{switch}</span>'
-        f'<button {sends("step_keyframe", -1)} title="Previous keyframe (P)" aria-label="Previous keyframe">\u25c0</button>'
+        f"{_step(-1, 'Previous keyframe', 'P', PREVIOUS_SIGN)}"
         f'<label class="oa-jump" title="Type a number to jump there">'
         f'<input type="number" min="1" max="{count}" value="{keyframe + 1}" data-part="jump" '
         'data-send="jump" aria-label="Keyframe number"></label>'
@@ -80,12 +77,17 @@ def _scrubber(catalogue: Catalogue, session: int, keyframe: int, selected: int |
         f'<span class="oa-slider">{_ticks(catalogue, session, count, selected)}'
         f'<input type="range" min="0" max="{max(count - 1, 0)}" value="{keyframe}" data-part="slider" '
         'data-send="scrub" aria-label="Keyframe"></span>'
-        f'<button {sends("step_keyframe", 1)} title="Next keyframe (N)" aria-label="Next keyframe">\u25b6</button>'
-        f'<span {step}><button {sends("best_view")} title="The keyframe that shows the selected object best" '
+        f"{_step(1, 'Next keyframe', 'N', NEXT_SIGN)}"
+        f'<span data-part="step" class="oa-steps"><button {sends("best_view")} title="{best_tip}" '
         f"{'' if selected is not None else 'disabled'}>best view</button>"
         f'<button {sends("fly_keyframe")} title="Move the camera of the map to this keyframe (V)">'
         f"go there {key('V')}</button></span></div>"
     )
+
+
+def _step(by: int, name: str, hotkey: str, sign: str) -> str:
+    send = sends("step_keyframe", by)
+    return f'<button {send} title="{name} ({hotkey})" aria-label="{name}">{sign}</button>'
 
 
 def _ticks(catalogue: Catalogue, session: int, count: int, selected: int | None) -> str:
@@ -183,12 +185,8 @@ def _overlay(
         x, y = 100 * columns.start / width, 100 * rows.start / height
         w, h = 100 * (columns.stop - columns.start) / width, 100 * (rows.stop - rows.start) / height
         name = f"{wording.object_name(object_id)}: {LABEL_NAMES[label_of(object_id)]}"
-        boxes.append(
-            (
-                w * h,
-                f'<rect x="{x:.1f}" y="{y:.1f}" width="{w:.1f}" height="{h:.1f}"><title>{name}</title></rect>',
-            )
-        )
+        place = f'x="{x:.1f}" y="{y:.1f}" width="{w:.1f}" height="{h:.1f}"'
+        boxes.append((w * h, f"<rect {place}><title>{name}</title></rect>"))
     # Biggest first, so that the small ones on top answer the pointer.
     marks = "".join(box for _, box in sorted(boxes, key=lambda entry: -entry[0]))
     if selected is not None:
@@ -200,7 +198,8 @@ def _overlay(
 
 
 def _colour_bar(low: str, high: str, gradient: str) -> str:
+    tip = "not seen by both visits"
     return (
         f'<div class="oa-colours"><span>{low}</span><i style="background:{gradient}"></i><span>{high}</span>'
-        '<i class="oa-hatch" title="not seen by both visits"></i><span title="not seen by both visits">unseen</span></div>'
+        f'<i class="oa-hatch" title="{tip}"></i><span title="{tip}">unseen</span></div>'
     )

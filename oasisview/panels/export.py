@@ -19,9 +19,9 @@ class Download:
 
 
 DOWNLOADS = (
-    Download("csv", ".csv", "Table (CSV)", "one row per object: label, evidence, who decided; for a spreadsheet"),
+    Download("csv", ".csv", "Table (CSV)", "one row per object: label, evidence, who decided"),
     Download("json", ".json", "Table (JSON)", "the same for programs"),
-    Download("ply", ".ply", "Annotated map (PLY)", "points of both visits in label colours; for CloudCompare or MeshLab"),
+    Download("ply", ".ply", "Annotated map (PLY)", "points of both visits in label colours"),
     Download("heatmaps", "_heatmaps.zip", "Heatmaps (ZIP)", "float TIFF and PNG of every keyframe"),
 )  # fmt: skip
 

@@ -46,7 +46,8 @@ assert set(LAYER_WORDS) == {field.name for field in fields(Layers)}
 def hud_html(mode: str, colours: str, layers: Layers, *, dark: bool) -> str:
     """Switches at the top left of the map."""
     visits = "".join(
-        f'<button aria-pressed="{str(mode == m).lower()}" {sends("mode", m)} title="{_mode_tip(m)}">{word}</button>'
+        f'<button aria-pressed="{str(mode == m).lower()}" {sends("mode", m)} '
+        f'title="{_mode_tip(m)}">{word}</button>'
         for m, word in MODES.items()
     )
     paints = "".join(
@@ -64,8 +65,8 @@ def hud_html(mode: str, colours: str, layers: Layers, *, dark: bool) -> str:
         '<div class="oa oa-hud">'
         f'<span class="oa-segments" role="group" aria-label="Map of which visit">{visits}</span>'
         f'<button {sends("overview")} title="See the whole site (H)">Overview</button>'
-        '<details><summary title="What the map shows and how it is coloured">Layers</summary><div class="oa-popup">'
-        f"<b>Colour of objects</b>{paints}<b>Show</b>{switches}</div></details>"
+        '<details><summary title="What the map shows and how it is coloured">Layers</summary>'
+        f'<div class="oa-popup"><b>Colour of objects</b>{paints}<b>Show</b>{switches}</div></details>'
         f'<button {sends("theme", not dark)} title="{theme}" aria-label="{theme}">{sign}</button>'
         f'<button data-open="help" title="Keys" aria-label="Keys">{key("?")}</button></div>'
     )

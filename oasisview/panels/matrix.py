@@ -34,25 +34,24 @@ def matrix_html(catalogue: Catalogue, kind: str, selected: int | None, cell: tup
     matrix = catalogue.result.score_matrix
     rows, columns = matrix.sigma.shape
     if rows == 0 or columns == 0:
-        return (
-            '<div class="oa oa-matrix">'
-            + empty("There is no score matrix: one of the visits holds no objects.")
-            + "</div>"
-        )
+        nothing = empty("There is no score matrix: one of the visits holds no objects.")
+        return f'<div class="oa oa-matrix">{nothing}</div>'
     switch = "".join(
         f'<button aria-pressed="{str(kind == k).lower()}" {sends("matrix_kind", k)}>{name}</button>'
         for k, name in KINDS.items()
     )
-    # A square cell where the panel is wide enough; long matrices scroll instead of shrinking away.
-    aspect = f"{columns}/{rows}"
+    url = escape(catalogue.matrix_url(kind))
     return (
-        f'<div class="oa oa-matrix"><div class="oa-segments" role="group" aria-label="What is shown">{switch}</div>'
+        '<div class="oa oa-matrix">'
+        f'<div class="oa-segments" role="group" aria-label="What is shown">{switch}</div>'
         f'<div class="oa-note">Rows: {rows} objects before. Columns: {columns} objects after. '
         "Framed: chosen partners. Click a cell to see the pair.</div>"
-        f'<div class="oa-grid" style="aspect-ratio:{aspect}" data-pixel="matrix" data-session="0" data-keyframe="0">'
-        f'<img src="{escape(catalogue.matrix_url(kind))}" alt="score matrix: {KINDS[kind]}" draggable="false">'
+        f'<div class="oa-grid" style="aspect-ratio:{columns}/{rows}" '
+        'data-pixel="matrix" data-session="0" data-keyframe="0">'
+        f'<img src="{url}" alt="score matrix: {KINDS[kind]}" draggable="false">'
         f"{_marks(catalogue, selected, cell)}</div>"
-        f'<div class="oa-colours"><span>0</span><i style="background:{gradient_css(CIVIDIS)}"></i><span>1</span></div>'
+        f'<div class="oa-colours"><span>0</span><i style="background:{gradient_css(CIVIDIS)}"></i>'
+        "<span>1</span></div>"
         f"{_pair(catalogue, cell)}</div>"
     )
 
@@ -94,7 +93,8 @@ def _pair(catalogue: Catalogue, cell: tuple[int, int] | None) -> str:
         for session, (word, object_id) in enumerate((("Before", before), ("After", after)))
     )
     return (
-        f'<div class="oa-pair" data-pair="{before}-{after}">{section("This pair")}<div class="oa-tiles">{tiles}</div>'
+        f'<div class="oa-pair" data-pair="{before}-{after}">{section("This pair")}'
+        f'<div class="oa-tiles">{tiles}</div>'
         f"<p>{escape(verdict)}</p>"
         f"<p>{wording.percent(sigma)} of the patches of #{before} match on #{after} "
         f"({wording.percent(float(matrix.sigma_backward[row, column]))} the other way), "

@@ -68,7 +68,6 @@ def load_map_points(result: Result, max_points: int = MAX_POINTS) -> MapPoints:
     rest = total - sum(object_counts)
     rest_share = min(1.0, (max_points - object_budget) / max(rest, 1))
     up = np.asarray(sessions[-1].up_world, np.float64)
-    filled = [s.points_world for s in sessions if len(s.points_world)]
     origin = _middle([session.points_world for session in sessions])
     visits = tuple(_load_visit(session, origin, up, object_share, rest_share) for session in sessions)
     drawn = [np.concatenate([visit.background, visit.objects]) for visit in visits]

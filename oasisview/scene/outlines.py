@@ -77,8 +77,10 @@ def path_segments(positions_world: NDArray[np.floating]) -> NDArray[np.float32]:
 def box_mesh() -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
     """Vertices (8, 3) and triangles (12, 3) of the unit box around the origin, facing outward."""
     faces = np.array(
-        [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]
-        + [[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]],
+        [
+            *([0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]),
+            *([2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]),
+        ],
         np.uint32,
     )
     return _CORNERS - 0.5, faces

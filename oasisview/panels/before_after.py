@@ -1,0 +1,92 @@
+"""Crops of an object on both visits with the patch matches between them, or one over the other."""
+
+from __future__ import annotations
+
+from oasisview import wording
+from oasisview.catalogue import BeforeAfter, Catalogue, ObjectView
+from oasisview.panels.markup import key, picture, sends
+from oasisview.shell import escape
+from oasisview.wording import LABEL_NAMES
+from pipeline.result import MapObject
+
+# Widths of a crop and of the gap between the two, percent of the panel (panels.css has the same).
+CROP_WIDTH, GAP_WIDTH = 47.5, 5.0
+
+
+def before_after_html(catalogue: Catalogue, item: MapObject, *, swipe: bool) -> str:
+    """The pictures; where a visit lacks the object, the same place is shown instead."""
+    views = catalogue.before_after(item.object_id)
+    head = (
+        '<div class="oa-section"><span>Before and after</span>'
+        f'<button {sends("swipe")} aria-pressed="{str(swipe).lower()}" title="One over the other">'
+        f"swipe {key('X')}</button></div>"
+    )
+    if swipe and views.before is not None and views.after is not None:
+        return head + _swipe(views.before, views.after)
+    figures = _figure(item, 0, views.before) + _figure(item, 1, views.after)
+    return head + f'<div class="oa-crops">{figures}{_lines(views)}</div>{_note(views)}'
+
+
+def _swipe(before: ObjectView, after: ObjectView) -> str:
+    return (
+        f'<div class="oa-swipe"><img src="{escape(after.url)}" alt="After">'
+        f'<img class="oa-over" src="{escape(before.url)}" alt="Before">'
+        '<span class="oa-caption">Before \u25c2 \u25b8 After</span>'
+        '<input type="range" min="0" max="100" value="50" aria-label="Before or after" '
+        "oninput=\"this.parentNode.style.setProperty('--x',this.value+'%')\"></div>"
+    )
+
+
+def _figure(item: MapObject, session: int, view: ObjectView | None) -> str:
+    word = wording.visit_word(session)
+    if view is None:
+        return (
+            f'<figure><div class="oa-none">{word}: no keyframe shows this place<br>'
+            f"{wording.percent(item.coverage)} of it was looked at</div></figure>"
+        )
+    if view.place is not None:
+        x, y, width, height = (f"{v:.1f}" for v in view.place)
+        mark = f'<rect x="{x}" y="{y}" width="{width}" height="{height}" class="oa-place"/>'
+        caption = f"{word}: same place \u00b7 kf {view.keyframe + 1}"
+    else:
+        line = f"oa-line oa-{LABEL_NAMES[item.label]}"
+        mark = f'<path d="{view.outline}" class="oa-halo"/><path d="{view.outline}" class="{line}"/>'
+        caption = f"{word} \u00b7 kf {view.keyframe + 1}"
+    jump = sends("keyframe", {"session": session, "keyframe": view.keyframe})
+    return (
+        f'<figure {jump} title="Show keyframe {view.keyframe + 1} below the map">'
+        f'{picture(view.url, caption)}<svg viewBox="0 0 100 100" preserveAspectRatio="none">{mark}</svg>'
+        f'<span class="oa-caption">{caption}</span></figure>'
+    )
+
+
+def _lines(views: BeforeAfter) -> str:
+    if not views.lines:
+        return ""
+    drawn = []
+    for line in views.lines:
+        x1, y1 = line.before[0] * CROP_WIDTH, line.before[1] * 100
+        x2, y2 = CROP_WIDTH + GAP_WIDTH + line.after[0] * CROP_WIDTH, line.after[1] * 100
+        kind = "oa-link" if line.lands_on_object else "oa-link oa-astray"
+        drawn.append(f'<line class="{kind}" x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}"/>')
+    return (
+        '<svg class="oa-links" viewBox="0 0 100 100" preserveAspectRatio="none" role="img" '
+        f'aria-label="{len(drawn)} patch matches">{"".join(drawn)}</svg>'
+    )
+
+
+def _note(views: BeforeAfter) -> str:
+    if views.before is None or views.after is None:
+        return ""
+    count, landing = len(views.lines), sum(line.lands_on_object for line in views.lines)
+    if not views.compared:
+        text = "These two keyframes were not compared patch by patch."
+    elif count == 0:
+        text = "No patch of the object finds a match in the other picture."
+    elif landing == count:
+        text = f"Its {count} strongest patch matches, all on the same object."
+    elif landing:
+        text = f"Its {count} strongest patch matches: {landing} on the same object, dashed ones elsewhere."
+    else:
+        text = f"Its {count} strongest patch matches (dashed) end on other things."
+    return f'<div class="oa-note">{text}</div>'
