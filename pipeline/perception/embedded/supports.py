@@ -62,7 +62,7 @@ def find_supports(
         plan = view.plan[members]
         area = len(np.unique(np.floor(plan), axis=0))
         hull = HullMask.around(plan, margin=3)
-        hidden_board = area >= 0.25 * least_area and hull.area >= 1.6 * least_area and area > 0.1 * hull.area
+        hidden_board = area >= 0.25 * least_area and hull.area >= least_area and area > 0.1 * hull.area
         if area < least_area and not hidden_board:
             continue
         design = np.column_stack([plan, np.ones(len(plan))])
