@@ -48,6 +48,7 @@ class Choices:
     session: int = 1
     keyframe: int = 0
     mode: str = "after"
+    wanted_mode: str = "after"  # what the person chose; a selection may need another one for a while
     colours: str = "label"
     layers: Layers = field(default_factory=Layers)
     dark: bool = False
@@ -131,6 +132,7 @@ class Inspector:
     def close(self) -> None:
         """The tab is gone."""
         self._closed = True
+        self._map.close()
         self._decisions.unsubscribe(self._on_decisions)
         self._bench.leave(self._client.client_id, self._on_presence)
 
@@ -243,14 +245,14 @@ class Inspector:
     def _show_where_visible(self, item: MapObject) -> None:
         """An object that is not in the map of the visit shown brings the other visit in."""
         visits = {sighting.session for sighting in item.sightings}
-        mode = self.choices.mode
+        mode = self.choices.wanted_mode
         gone = self._decisions.label_of(item.object_id) in PAST_LABELS
-        if mode == "after" and 1 not in visits:
-            self.set_mode("both" if gone else "before")
-        elif mode == "both" and 1 not in visits and not gone:
-            self.set_mode("before")
+        if mode != "before" and 1 not in visits:
+            mode = "both" if gone else "before"
         elif mode == "before" and 0 not in visits:
-            self.set_mode("after")
+            mode = "after"
+        if mode != self.choices.mode:
+            self._apply_mode(mode)
 
     def _choose_keyframe(self, item: MapObject) -> None:
         choices = self.choices
@@ -414,10 +416,14 @@ class Inspector:
     def set_mode(self, mode: str) -> None:
         """Before, after or both in the map."""
         with self._lock:
-            self.choices.mode = mode
-            self._map.set_mode(mode)
+            self.choices.wanted_mode = mode
+            self._apply_mode(mode)
             self._map.select(self._selected())
-            self._show_hud()
+
+    def _apply_mode(self, mode: str) -> None:
+        self.choices.mode = mode
+        self._map.set_mode(mode)
+        self._show_hud()
 
     def _flip_mode(self) -> None:
         self.set_mode("after" if self.choices.mode == "before" else "before")

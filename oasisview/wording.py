@@ -155,6 +155,11 @@ def _why_static(item: MapObject, limits: Limits) -> str:
 
 def _why_moved(item: MapObject, limits: Limits) -> str:
     away = "another place" if item.displacement_m is None else f"{length(item.displacement_m)} away"
+    if item.case is not MatchCase.CONFIDENT:
+        return (
+            f"Probably the same object in a new place, {away}, but look twice: its patches alone do not "
+            f"show it ({_match_words(item)})."
+        )
     return (
         f"Same object, new place: {_match_words(item)}, but it now stands {away} "
         f"(up to {length(limits.tau_d_m)} counts as in place)."
@@ -215,8 +220,10 @@ def overridden(label: ChangeLabel, machine: ChangeLabel, who: str) -> str:
     return f"{who} set this to {LABEL_NAMES[label]}; the machine said {LABEL_NAMES[machine]}."
 
 
-def rejection(sigma: float, s_bar: float, limits: Limits, *, partner_id: int | None) -> str:
-    """Why a candidate is not the counterpart."""
+def rejection(
+    sigma: float, s_bar: float, limits: Limits, *, partner_id: int | None, partner_sigma: float = 1.0
+) -> str:
+    """Why a candidate is not the counterpart; ``partner_*`` is the one that was chosen, if any."""
     if s_bar < limits.tau_s <= 1 and sigma >= limits.tau_sigma:
         return (
             f"{percent(sigma)} of the patches land here, but they match poorly "
@@ -224,6 +231,11 @@ def rejection(sigma: float, s_bar: float, limits: Limits, *, partner_id: int | N
         )
     if sigma < limits.tau_sigma:
         return f"only {percent(sigma)} of the patches land here ({percent(limits.tau_sigma)} needed)"
+    if partner_id is not None and partner_sigma < sigma:
+        return (
+            f"matches by itself ({percent(sigma)}, quality {s_bar:.2f}), but over all objects together "
+            f"#{partner_id} was the better choice"
+        )
     if partner_id is not None:
         return f"matches too ({percent(sigma)}, quality {s_bar:.2f}), but #{partner_id} fits better"
     return (

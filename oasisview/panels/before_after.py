@@ -83,6 +83,8 @@ def _note(views: BeforeAfter) -> str:
         text = "These two keyframes were not compared patch by patch."
     elif count == 0:
         text = "No patch of the object finds a match in the other picture."
+    elif count == 1:
+        text = f"Its only patch match in view ends {'on the same object' if landing else 'elsewhere'}."
     elif landing == count:
         text = f"Its {count} strongest patch matches, all on the same object."
     elif landing:

@@ -115,8 +115,13 @@ def _table(catalogue: Catalogue, found: list[Candidate], session: int) -> str:
 
 
 def _rival(catalogue: Catalogue, rival: Candidate, partner: Candidate | None, session: int) -> str:
-    partner_id = partner.object_id if partner is not None else None
-    reason = wording.rejection(rival.sigma, rival.s_bar, catalogue.limits, partner_id=partner_id)
+    reason = wording.rejection(
+        rival.sigma,
+        rival.s_bar,
+        catalogue.limits,
+        partner_id=partner.object_id if partner is not None else None,
+        partner_sigma=partner.sigma if partner is not None else 1.0,
+    )
     name = wording.object_name(rival.object_id)
     return (
         f'<div class="oa-rival" role="button" tabindex="0" {sends("select", rival.object_id)}>'

@@ -20,6 +20,7 @@ LABEL_RGB: Mapping[bool, Mapping[ChangeLabel, Rgb]] = {
     False: {label: rgb(colour) for label, colour in palette.LIGHT.items()},
     True: {label: rgb(colour) for label, colour in palette.DARK.items()},
 }
+REPLACED_RGB: Mapping[bool, Rgb] = {False: rgb(palette.REPLACED_LIGHT), True: rgb(palette.REPLACED_DARK)}
 GROUND_RGB: Mapping[bool, Rgb] = {False: (244, 245, 247), True: (20, 22, 26)}
 
 
@@ -77,7 +78,7 @@ def load_map_points(result: Result, max_points: int = MAX_POINTS) -> MapPoints:
         visits=visits,
         origin=origin,
         up_world=up,
-        point_size_m=float(np.clip(1.25 * point_spacing_m(largest), 0.008, 0.3)),
+        point_size_m=float(np.clip(1.5 * point_spacing_m(largest), 0.01, 0.3)),
         home=Viewpoint(_shifted(home.position, origin), _shifted(home.target, origin)),
         total_points=total,
         shown_points=sum(len(v.background) + len(v.ceiling) + len(v.objects) for v in visits),

@@ -6,10 +6,12 @@ under ``/map``, which is shifted by the map's origin.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import viser
+import viser.transforms as vtf
 from numpy.typing import NDArray
 
 from oasisview import wording
@@ -17,13 +19,15 @@ from oasisview.catalogue import Catalogue
 from oasisview.panels.hud import Layers
 from oasisview.panels.markup import GLYPHS
 from oasisview.scene import outlines
-from oasisview.scene.map_points import GROUND_RGB, MapPoints, Rgb, muted, object_colours
+from oasisview.scene.map_points import GROUND_RGB, REPLACED_RGB, MapPoints, Rgb, muted, object_colours
+from oasisview.scene.names import readable
 from oasisview.scene.picking import pick_object
 from oasisview.wording import LABEL_NAMES
 from pipeline.result import ChangeLabel, MapObject, Sighting
 
 # More names than this cannot be read in a map anyway; the most doubtful ones stay.
 MAX_NAMES = 30
+NAMES_AFTER_S = 0.2
 PAST_LABELS = (ChangeLabel.DISAPPEARED, ChangeLabel.MOVED)
 LabelOf = Callable[[int], ChangeLabel]
 
@@ -62,6 +66,7 @@ class MapView:
         self._clouds: dict[str, viser.PointCloudHandle] = {}
         self._picks: dict[int, viser.BatchedMeshHandle] = {}
         self._names: dict[int, viser.LabelHandle] = {}
+        self._name_timer: threading.Timer | None = None
         self._selected: int | None = None
 
     def build(self, mode: str, colours: str, layers: Layers, *, dark: bool) -> None:
@@ -79,6 +84,13 @@ class MapView:
         self._add_gone()
         self._boxes()
         self._apply_visibility()
+        self._sort_names()
+        self._client.camera.on_update(lambda _: self._sort_names_soon())
+
+    def close(self) -> None:
+        """The tab is gone: nothing more is sent."""
+        if self._name_timer is not None:
+            self._name_timer.cancel()
 
     # Choices of the inspector
 
@@ -127,13 +139,10 @@ class MapView:
         with self._client.atomic():
             for name in ("box", "ghost", "way", "name", "points"):
                 self._remove(f"/map/selected/{name}")
-            # The selected object carries a larger name of its own.
-            for object_id, shown in ((self._selected, True), (item.object_id if item else None, False)):
-                if object_id in self._names:
-                    self._names[object_id].visible = shown
             self._selected = item.object_id if item is not None else None
             if item is not None and item.sightings:
                 self._mark(item)
+        self._sort_names()
 
     def show_keyframe(self, session: int, keyframe: int) -> None:
         """Mark the camera of the keyframe in the band."""
@@ -320,7 +329,31 @@ class MapView:
                     thickness=1.6,
                     thickness_units="screen",
                 )
+        self._replaced_boxes()
         self._name(names)
+
+    def _replaced_boxes(self) -> None:
+        """One box around both objects of every *replaced* event that nobody has overruled."""
+        self._remove("/map/boxes/replaced")
+        edges = []
+        for event in self._catalogue.result.replaced:
+            gone, new = (self._catalogue.objects.get(i) for i in (event.disappeared_id, event.appeared_id))
+            if gone is None or new is None or self._mode == "before":
+                continue
+            stands = [self._label_of(item.object_id) is item.label for item in (gone, new)]
+            first, second = gone.sighting(0), new.sighting(1)
+            if all(stands) and first is not None and second is not None:
+                low = np.minimum(first.box_min_world_m, second.box_min_world_m) - self._points.origin
+                high = np.maximum(first.box_max_world_m, second.box_max_world_m) - self._points.origin
+                edges.append(outlines.dashed(outlines.box_segments(low, high, 0.03), 0.06))
+        if edges:
+            self._scene.add_line_segments(
+                "/map/boxes/replaced",
+                np.concatenate(edges),
+                REPLACED_RGB[self._dark],
+                thickness=2.0,
+                thickness_units="screen",
+            )
 
     def _name(self, shown: Sequence[tuple[int, ChangeLabel, Sighting]]) -> None:
         self._remove("/map/names")
@@ -333,10 +366,42 @@ class MapView:
                 position=self._top(sighting) + 0.04 * up,
                 anchor="bottom-center",
                 font_screen_scale=0.8,
-                visible=object_id != self._selected,
+                visible=False,
             )
             for object_id, label, sighting in shown[:MAX_NAMES]
         }
+        self._sort_names_soon()
+
+    def _sort_names_soon(self) -> None:
+        """Once the camera rests: every move of it is reported."""
+        if self._name_timer is not None:
+            self._name_timer.cancel()
+        self._name_timer = threading.Timer(NAMES_AFTER_S, self._sort_names)
+        self._name_timer.daemon = True
+        self._name_timer.start()
+
+    def _sort_names(self) -> None:
+        """Show the names that can be read from here; the selected object has a larger one of its own."""
+        names, camera = dict(self._names), self._client.camera
+        if not names:
+            return
+        try:
+            rotation = vtf.SO3(np.asarray(camera.wxyz)).as_matrix()
+            position, fov, height = np.asarray(camera.position), camera.fov, camera.image_height
+            width = camera.image_width
+        except AssertionError:  # the page has not told yet where its camera is
+            return
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = rotation, position
+        own = [i for i in names if i == self._selected]
+        order = own + [i for i in names if i != self._selected]
+        places = np.array([names[i].position for i in order]) + self._points.origin
+        shown = readable(places, T, fov, width, height)
+        with self._client.atomic():
+            for object_id, visible in zip(order, shown.tolist(), strict=True):
+                wanted = visible and object_id != self._selected
+                if names[object_id].visible != wanted:
+                    names[object_id].visible = wanted
 
     def _shown_sighting(self, item: MapObject) -> Sighting | None:
         if self._mode == "before":

@@ -40,10 +40,10 @@ def overview(points_world: NDArray[np.floating], up_world: NDArray[np.floating])
     right, forward = horizontal_axes(up)
     axes = np.stack([right, forward, up])
     sample = np.asarray(points_world[:: max(1, len(points_world) // 20000)], np.float64) @ axes.T
-    low, high = np.percentile(sample, 2, axis=0), np.percentile(sample, 98, axis=0)
+    low, high = np.percentile(sample, 6, axis=0), np.percentile(sample, 94, axis=0)
     centre = (low + high) / 2
     reach = max(float(np.linalg.norm((high - low)[:2])), 0.5)
-    position = centre + np.array([-0.38, -0.56, 0.74]) * reach * 0.75
+    position = centre + np.array([-0.38, -0.56, 0.74]) * reach * 0.85
     return _viewpoint(position @ axes, centre @ axes)
 
 
