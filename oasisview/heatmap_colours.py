@@ -25,7 +25,7 @@ PURPLE_ORANGE_DARK: tuple[str, ...] = (
 )
 
 # Depth differences beyond this are drawn in the last colour.
-GEOMETRIC_RANGE_M = 0.5
+GEOMETRIC_RANGE_M = 0.3
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

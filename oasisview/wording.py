@@ -124,9 +124,9 @@ def why(item: MapObject, limits: Limits) -> str:
         case ChangeLabel.MOVED:
             return _why_moved(item, limits)
         case ChangeLabel.APPEARED:
-            return _why_one_sided(item, appeared=True)
+            return _why_one_sided(item, limits, appeared=True)
         case ChangeLabel.DISAPPEARED:
-            return _why_one_sided(item, appeared=False)
+            return _why_one_sided(item, limits, appeared=False)
         case _:
             return _why_unknown(item, limits)
 
@@ -166,24 +166,30 @@ def _why_moved(item: MapObject, limits: Limits) -> str:
     )
 
 
-def _why_one_sided(item: MapObject, *, appeared: bool) -> str:
-    if appeared:
+def _why_one_sided(item: MapObject, limits: Limits, *, appeared: bool) -> str:
+    if item.sigma >= limits.tau_sigma and item.s_bar >= limits.tau_s:
+        visit = "earlier" if appeared else "later"
+        text = (
+            f"Its place changed: {percent(item.coverage)} of it was looked at on the {visit} visit. "
+            f"Something there looks like it ({_match_words(item)}), but is not it."
+        )
+    elif appeared:
         text = (
             f"Nothing on the earlier visit matches this object, and {percent(item.coverage)} of its place "
             "had been looked at then."
         )
-        if item.replaces is not None:
-            text += f" It stands where {object_name(item.replaces)} was."
     else:
         text = (
             f"Nothing on the later visit matches this object, and {percent(item.coverage)} of the place "
             "where it stood was looked at again."
         )
-        if item.replaced_by is not None:
-            text += f" {object_name(item.replaced_by).capitalize()} stands there now."
+    if item.replaces is not None:
+        text += f" It stands where {object_name(item.replaces)} was."
+    if item.replaced_by is not None:
+        text += f" {object_name(item.replaced_by).capitalize()} stands there now."
     if item.seen_through > 0:
-        visit = "then" if appeared else "now"
-        text += f" {percent(item.seen_through)} of its volume is seen to be empty {visit}."
+        visit = "then" if appeared else "the second time"
+        text += f" {percent(item.seen_through)} of its volume was seen to be empty {visit}."
     return text
 
 

@@ -67,6 +67,7 @@ class MapView:
         self._picks: dict[int, viser.BatchedMeshHandle] = {}
         self._names: dict[int, viser.LabelHandle] = {}
         self._name_timer: threading.Timer | None = None
+        self._keyframe_centre: NDArray[np.float64] | None = None
         self._selected: int | None = None
 
     def build(self, mode: str, colours: str, layers: Layers, *, dark: bool) -> None:
@@ -154,6 +155,8 @@ class MapView:
         self._scene.add_line_segments(
             "/map/current_keyframe", segments, accent, thickness=3.0, thickness_units="screen"
         )
+        self._keyframe_centre = np.asarray(record.T_world_camera[:3, 3], np.float64)
+        self._sort_names_soon()
 
     # Clicks
 
@@ -383,8 +386,6 @@ class MapView:
     def _sort_names(self) -> None:
         """Show the names that can be read from here; the selected object has a larger one of its own."""
         names, camera = dict(self._names), self._client.camera
-        if not names:
-            return
         try:
             rotation = vtf.SO3(np.asarray(camera.wxyz)).as_matrix()
             position, fov, height = np.asarray(camera.position), camera.fov, camera.image_height
@@ -393,6 +394,14 @@ class MapView:
             return
         T = np.eye(4)
         T[:3, :3], T[:3, 3] = rotation, position
+        if self._keyframe_centre is not None:
+            # A frustum right before the eye would cross out what one flew here to see.
+            frustum = self._scene.get_handle_by_name("/map/current_keyframe")
+            away = float(np.linalg.norm(position - self._keyframe_centre)) > 8 * self._frustum_depth
+            if frustum is not None and frustum.visible != away:
+                frustum.visible = away
+        if not names:
+            return
         own = [i for i in names if i == self._selected]
         order = own + [i for i in names if i != self._selected]
         places = np.array([names[i].position for i in order]) + self._points.origin
