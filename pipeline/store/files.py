@@ -86,7 +86,7 @@ def write_array(path: Path, array: NDArray[Any]) -> None:
             file.write(array.data)
 
 
-def write_arrays(path: Path, **arrays: NDArray[Any]) -> None:
+def write_arrays(path: Path, **arrays: Any) -> None:
     """Write an ``.npz`` atomically; the same arrays give the same bytes; object arrays are refused."""
     for name, array in arrays.items():
         if np.asarray(array).dtype.hasobject:
