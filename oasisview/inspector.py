@@ -110,11 +110,12 @@ class Inspector:
         with self._lock:
             self._build_panels(wide=hello is not None and hello.width_px >= WIDE_WINDOW_PX)
             self._listen()
+            choices = self.choices
+            self._map.build(choices.mode, choices.colours, choices.layers, dark=choices.dark)
+            # After the map: the up direction turns the world, and a camera set before with it.
             home = self._bench.points.home
             self._client.camera.position = home.position
             self._client.camera.look_at = home.target
-            choices = self.choices
-            self._map.build(choices.mode, choices.colours, choices.layers, dark=choices.dark)
             self._show_hud()
             self._show_queue()
             self._show_journal()
@@ -126,6 +127,7 @@ class Inspector:
                 self._show_evidence()
                 self._show_matrix()
                 self._show_band(whole=True)
+                self._fly(home)
         self._decisions.subscribe(self._on_decisions)
         self._bench.enter(self._client.client_id, self.user, self._on_presence)
 

@@ -194,14 +194,14 @@ def _why_one_sided(item: MapObject, limits: Limits, *, appeared: bool) -> str:
 
 
 def _why_unknown(item: MapObject, limits: Limits) -> str:
+    other = "earlier" if item.sighting(0) is None else "later"
+    maybe = "have been there already" if other == "earlier" else "still be there"
     if item.coverage < 0.005:
-        other = "earlier" if item.sighting(0) is None else "later"
-        maybe = "have been there already" if other == "earlier" else "still be there"
         return f"Nobody looked at this place on the {other} visit: it may {maybe}, or not."
     if item.coverage < limits.nu_min:
         return (
-            f"Only {percent(item.coverage)} of this place was looked at on the other visit; "
-            f"{percent(limits.nu_min)} are needed. It may still be there."
+            f"Only {percent(item.coverage)} of this place was looked at on the {other} visit; "
+            f"{percent(limits.nu_min)} are needed. It may {maybe}."
         )
     if item.case is MatchCase.PARTIAL:
         return (

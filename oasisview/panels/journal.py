@@ -31,10 +31,11 @@ def journal_html(events: Sequence[Event]) -> str:
         if event.target_id is not None:
             (undone.add if event.kind is Kind.UNDO else undone.discard)(event.target_id)
     rows = "".join(_row(event, struck=event.id in undone) for event in reversed(events[-SHOWN:]))
+    entries = "1 entry" if len(events) == 1 else f"{len(events)} entries"
     older = len(events) - SHOWN
     more = f'<div class="oa-note">{older} older entries are in review.sqlite.</div>' if older > 0 else ""
     return (
-        f'<div class="oa oa-journal"><div class="oa-note">{len(events)} entries, newest first. '
+        f'<div class="oa oa-journal"><div class="oa-note">{entries}, newest first. '
         f"Nothing is ever removed; undo is an entry too.</div>{rows}{more}</div>"
     )
 

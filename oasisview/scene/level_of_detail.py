@@ -24,10 +24,12 @@ def thin(points_world: NDArray[np.floating], max_points: int) -> NDArray[np.int6
     extent = float(np.max(points_world.max(axis=0) - low)) or 1.0
     # Surfaces fill about (extent / voxel)^2 voxels of a cube: a first guess that the loop corrects.
     voxel = extent / max(np.sqrt(max_points), 1.0) / 4
+    kept = np.arange(count, dtype=np.int64)
     while True:
-        cells = np.floor((points_world - low) / voxel).astype(np.int64)
+        cells = np.floor((points_world[kept] - low) / voxel).astype(np.int64)
         keys = (cells[:, 0] << 42) | (cells[:, 1] << 21) | cells[:, 2]
-        kept = np.unique(keys, return_index=True)[1]
+        # Each round only looks at what the one before left: the sort over all points happens once.
+        kept = kept[np.unique(keys, return_index=True)[1]]
         if len(kept) <= max_points:
             return np.sort(kept)
         voxel *= max(1.1, float(np.sqrt(len(kept) / max_points)))

@@ -18,6 +18,8 @@ from oasisview.app import RunningApp, start
 from oasisview.inspector import Inspector
 from pipeline.result import ChangeLabel
 
+# Software rendering costs by the pixel.
+SMALL_WINDOW = (1120, 700)
 OpenViewer = Callable[..., ViewerPage]
 
 
@@ -33,7 +35,7 @@ def opened(app: RunningApp, open_viewer: OpenViewer) -> Callable[..., ViewerPage
     """Opens a page of the app and waits until the result is before the inspector."""
 
     def open_it(query: str = "") -> ViewerPage:
-        view = open_viewer(app.server, query=query)
+        view = open_viewer(app.server, query=query, size=SMALL_WINDOW)
         view.page.wait_for_selector(".oa-row")
         view.page.wait_for_selector("#oa-band img")
         view.wait_node("/map/1/objects")
@@ -49,6 +51,13 @@ def inspector_of(app: RunningApp, view: ViewerPage) -> Inspector:
 def select(view: ViewerPage, object_id: int) -> None:
     view.page.locator(f'.oa-row[data-object="{object_id}"]').click()
     view.page.wait_for_selector(f'[data-evidence="{object_id}"]')
+
+
+def wait_caption(view: ViewerPage, text: str) -> None:
+    """Wait until the first picture of the band is captioned so."""
+    view.wait_js(
+        "text => document.querySelector('[data-part=this] figcaption').innerText.includes(text)", text
+    )
 
 
 def journal_rows(result: Path) -> list[tuple]:
@@ -80,18 +89,13 @@ def test_scrubbing_shows_each_keyframe_with_its_counterpart_and_heatmaps(opened)
     slider.focus()
     for _ in range(3):
         slider.press("ArrowRight")
-    page.wait_for_function("() => document.querySelector('[data-part=count]') && "
-                           "document.querySelector('[data-part=this] figcaption').innerText.includes('kf 5')")  # fmt: skip
+    wait_caption(view, "kf 5")
     sizes = page.eval_on_selector_all("#oa-band img", "images => images.map(i => i.naturalWidth)")
     assert len(sizes) == 4 and min(sizes) > 0
     page.locator('[data-part="jump"]').fill("1")
-    page.wait_for_function(
-        "() => document.querySelector('[data-part=this] figcaption').innerText.includes('kf 1')"
-    )
+    wait_caption(view, "kf 1")
     page.locator('[data-part="visit"] button', has_text="Before").click()
-    page.wait_for_function(
-        "() => document.querySelector('[data-part=this] figcaption').innerText.includes('Before')"
-    )
+    wait_caption(view, "Before")
     assert not page.problems
 
 
@@ -183,9 +187,8 @@ def test_an_override_is_on_disk_recolours_every_page_and_survives_undo_and_reloa
 
     mine.page.reload()
     mine.page.wait_for_selector('[data-evidence="12"]')
-    mine.page.wait_for_function(
-        "() => document.querySelector('[data-evidence=\"12\"] [data-role=label]').innerText.includes('static')"
-    )
+    label = "document.querySelector('[data-evidence=\"12\"] [data-role=label]')"
+    mine.page.wait_for_function(f"() => {label}.innerText.includes('static')")
     mine.page.get_by_role("tab", name="Journal").click()
     assert mine.page.locator(".oa-entry").count() == 3
 
@@ -199,10 +202,9 @@ def test_accepting_goes_through_the_queue_in_order(app, opened, small_result_pat
     view.page.wait_for_function(
         "id => document.querySelector('[data-evidence]').dataset.evidence !== String(id)", arg=first
     )
-    assert journal_rows(small_result_path) == [
-        ("accept", first, journal_rows(small_result_path)[0][2], app.workbench.catalogue.objects[first].label, "",
-         inspector_of(app, view).user)
-    ]  # fmt: skip
+    label = app.workbench.catalogue.objects[first].label
+    user = inspector_of(app, view).user
+    assert journal_rows(small_result_path) == [("accept", first, label, label, "", user)]
     assert view.page.locator("[data-role=reviewed]").inner_text().startswith("1 of 9")
     view.page.locator('[data-send="filter"][aria-label^="static"]').click()
     view.page.wait_for_function(
@@ -241,7 +243,8 @@ def test_values_from_a_browser_that_make_no_sense_change_nothing(app, opened, sm
     view = opened()
     for kind, value in [
         ("select", 99999), ("select", "1; drop"), ("decide", "exploded"), ("scrub", -3), ("scrub", 10**9),
-        ("keyframe", {"session": 7, "keyframe": 0}), ("pixel", {"session": 9, "keyframe": 0, "u": 0.5, "v": 0.5}),
+        ("keyframe", {"session": 7, "keyframe": 0}),
+        ("pixel", {"session": 9, "keyframe": 0, "u": 0.5, "v": 0.5}),
         ("layer", {"key": "__class__", "value": True}), ("mode", "sideways"), ("export", "../../etc"),
         ("filter", None), ("colours", 3), ("reason", "without being asked"),
     ]:  # fmt: skip

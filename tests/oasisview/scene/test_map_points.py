@@ -48,8 +48,15 @@ def test_identities_are_told_apart_and_the_same_on_both_visits(small_result: Res
     distance = np.linalg.norm(colours[:, None] - colours[None], axis=-1) + 1e3 * np.eye(30)
     assert distance.min() > 15
     visits = load_map_points(small_result).visits
-    means = [
-        object_colours(v.objects_rgb * 0, v.object_ids, "identity", lambda i: ChangeLabel.STATIC, LABEL_RGB[True],
-                       dark=True)[v.object_ids == 4][0] for v in visits
-    ]  # fmt: skip
-    assert (means[0] == means[1]).all()
+    colours_of = [
+        object_colours(
+            0 * v.objects_rgb,
+            v.object_ids,
+            "identity",
+            lambda i: ChangeLabel.STATIC,
+            LABEL_RGB[True],
+            dark=True,
+        )[v.object_ids == 4]
+        for v in visits
+    ]
+    assert (colours_of[0][0] == colours_of[1][0]).all()
