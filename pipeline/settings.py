@@ -13,10 +13,12 @@ from typing import Any, Literal, get_type_hints
 
 from pipeline.errors import InputError
 
+_LISTED = "`oasisview run --settings` lists them all"
 
-def setting(default: Any, help: str, *, unit: str = "", symbol: str = "") -> Any:
-    """A dataclass field that knows its unit and the paper's symbol."""
-    return field(default=default, metadata={"help": help, "unit": unit, "symbol": symbol})
+
+def setting(default: Any, help: str, *, unit: str = "", symbol: str = "", least: float | None = None) -> Any:
+    """A dataclass field that knows its unit, the paper's symbol and the smallest value that makes sense."""
+    return field(default=default, metadata={"help": help, "unit": unit, "symbol": symbol, "least": least})
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,8 @@ class ArchiveSettings:
 class ImageSettings:
     """Size at which images are processed."""
 
-    max_width: int = setting(640, "wider images are scaled down to this width", unit="px")
-    geometry_stride: int = setting(2, "geometry uses every n-th pixel", unit="px")
+    max_width: int = setting(640, "wider images are scaled down to this width", unit="px", least=32)
+    geometry_stride: int = setting(2, "geometry uses every n-th pixel", unit="px", least=1)
     max_depth_m: float = setting(30.0, "farther depth is ignored", unit="m")
 
 
@@ -51,14 +53,14 @@ class KeyframeSettings:
     sparse_step: float = setting(
         0.2, "an archive whose median step is at least this share of a threshold is sparse already: keep all"
     )
-    submap_size: int = setting(10, "keyframes in a submap", symbol="N_sub")
+    submap_size: int = setting(10, "keyframes in a submap", symbol="N_sub", least=1)
 
 
 @dataclass(frozen=True)
 class SurfaceSettings:
     """Voxel maps: the scale of everything geometric follows from what a pixel covers."""
 
-    voxel_size_m: float = setting(0.0, "edge of a voxel; 0 = from the pixel footprint", unit="m")
+    voxel_size_m: float = setting(0.0, "edge of a voxel; 0 = from the pixel footprint", unit="m", least=0)
     footprint_factor: float = setting(1.3, "voxel edge over the footprint of one stride at the depth below")
     depth_percentile: float = setting(80.0, "percentile of depth that sets the voxel edge", unit="%")
     min_voxel_m: float = setting(0.016, "smallest automatic voxel", unit="m")
@@ -81,7 +83,7 @@ class PerceptionSettings:
 class DescriptorSettings:
     """The embedded 168-d descriptor: gradients and colour, no weights."""
 
-    patch_px: int = setting(16, "patch edge at processing size", unit="px")
+    patch_px: int = setting(16, "patch edge at processing size", unit="px", least=1)
     colour_weight: float = setting(0.4, "share of colour in the correlation")
     colour_sigma_lab: float = setting(20.0, "kernel width of the colour similarity", unit="Lab units")
     lightness_weight: float = setting(0.5, "weight of L against a and b")
@@ -148,7 +150,9 @@ class ObservationSettings:
 class CorrespondenceSettings:
     """Co-visible pairs and dense matches (paper, Sec. III-C.1)."""
 
-    pairs_per_keyframe: int = setting(3, "best co-visible keyframes of the other visit to compare with")
+    pairs_per_keyframe: int = setting(
+        3, "best co-visible keyframes of the other visit to compare with", least=1
+    )
     min_shared: float = setting(0.15, "share of pixels two keyframes must both see")
     search_radius_patches: int = setting(
         4, "the heatmap looks for the best match this far around the expected place", unit="patches"
@@ -218,6 +222,8 @@ class Settings:
         """
         settings = cls()
         for section, entries in values.items():
+            if not isinstance(entries, dict) or not hasattr(settings, section):
+                raise InputError(f"there is no section of settings {section!r}", _LISTED)
             for name, value in entries.items():
                 settings = settings.override(f"{section}.{name}", value)
         return settings
@@ -229,14 +235,21 @@ class Settings:
             InputError: there is no such setting, or the value does not fit its type.
         """
         section_name, _, setting_name = name.partition(".")
-        section = getattr(self, section_name, None)
-        if section is None or not hasattr(section, setting_name):
-            raise InputError(f"there is no setting {name!r}", "`oasisview run --settings` lists them all")
-        wanted = get_type_hints(type(section))[setting_name]
-        converted = _convert(name, value, wanted)
+        section: Any = getattr(self, section_name, None)
+        known = {entry.name: entry for entry in dataclasses.fields(section)} if _is_section(section) else {}
+        if setting_name not in known:
+            raise InputError(f"there is no setting {name!r}", _LISTED)
+        converted = _convert(name, value, get_type_hints(type(section))[setting_name])
+        least = known[setting_name].metadata["least"]
+        if least is not None and converted < least:
+            raise InputError(f"{name} cannot be {value!r}", f"it is at least {least:g}")
         return dataclasses.replace(
             self, **{section_name: dataclasses.replace(section, **{setting_name: converted})}
         )
+
+
+def _is_section(value: Any) -> bool:
+    return dataclasses.is_dataclass(value) and not isinstance(value, type)
 
 
 def _convert(name: str, value: Any, wanted: Any) -> Any:
@@ -251,7 +264,7 @@ def _convert(name: str, value: Any, wanted: Any) -> Any:
         return value.lower() in ("true", "on", "1")
     try:
         converted = wanted(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} cannot be {value!r}", f"it is a number of type {wanted.__name__}") from None
     if wanted is int and float(value) != converted:
         raise InputError(f"{name} cannot be {value!r}", "it is a whole number")
