@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import OrderedDict
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import open3d as o3d
@@ -19,12 +18,28 @@ from pipeline.store.files import write_arrays
 BLOCK_RESOLUTION = 8
 _CACHED_SUBMAPS = 8
 _NEAR_M = 0.1
+_BLOCKS = 4096
+# Voxels seen in a single pixel (weight 1) count: sparse keyframes see much of a place once only. Open3D keeps
+# what lies above the threshold, not at it.
+MIN_WEIGHT = 0.5
+CAST_THREADS = 2
 
-# A finished submap in memory: a distance field, or the points of a LiDAR visit.
-Surface = o3d.t.geometry.VoxelBlockGrid | NDArray[np.float32]
 
-# Open3D warns about its own reallocations on every ray cast.
+# Open3D warns about reallocations of its own while integrating.
 o3d.utility.set_verbosity_level(o3d.utility.VerbosityLevel.Error)
+
+
+@dataclass(frozen=True)
+class LoadedSubmap:
+    """A finished submap in memory.
+
+    Attributes:
+        points_world: (P, 3) float32 metres: vertices of the mesh, or the points of a LiDAR visit.
+        mesh: to cast rays at; None without triangles.
+    """
+
+    points_world: NDArray[np.float32]
+    mesh: o3d.t.geometry.RaycastingScene | None
 
 
 @dataclass(frozen=True)
@@ -66,23 +81,30 @@ class TsdfSubmap:
             self._volume.integrate(blocks, image, intrinsic, extrinsic, 1.0, far, band)
 
     def save(self, path: Path) -> None:
-        """Write the submap (plain arrays: block coordinates, distances, weights)."""
-        slots = self._volume.hashmap().active_buf_indices().to(o3c.int64)
-        keys = self._volume.hashmap().key_tensor()[slots].numpy()
-        # The hash map's order depends on threads; sorted blocks make the file reproducible.
-        order = np.lexsort(keys.T[::-1])
-        tsdf = self._volume.attribute("tsdf")[slots].numpy()[order]
-        weight = self._volume.attribute("weight")[slots].numpy()[order]
-        write_arrays(path, blocks=keys[order], tsdf=tsdf, weight=weight)
+        """Write the surface of the submap as a triangle mesh: vertices (V, 3) metres, triangles (T, 3)."""
+        vertices, triangles = self._mesh()
+        vertices, triangles = _in_canonical_order(vertices, triangles)
+        write_arrays(path, points_world=vertices, triangles=triangles)
+
+    def _mesh(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        nothing = np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32)
+        if not len(self._volume.hashmap().active_buf_indices()):
+            return nothing
+        try:
+            mesh = self._volume.extract_triangle_mesh(MIN_WEIGHT)
+        except RuntimeError:
+            # Open3D cannot build a mesh without vertices: depth that crosses no voxel corner leaves none.
+            return nothing
+        return mesh.vertex.positions.numpy(), mesh.triangle.indices.numpy()
 
 
 class SubmapSurfaces:
-    """The finished TSDF submaps of a visit, loaded when a view needs them."""
+    """The finished submaps of a visit, loaded when a view needs them."""
 
     def __init__(self, folder: Path, grid: TsdfGrid) -> None:
         self._folder = folder
         self._grid = grid
-        self._loaded: OrderedDict[int, Surface] = OrderedDict()
+        self._loaded: OrderedDict[int, LoadedSubmap] = OrderedDict()
 
     def path(self, submap: int) -> Path:
         """File of a submap."""
@@ -98,74 +120,62 @@ class SubmapSurfaces:
         """
         nearest = np.full((camera.height, camera.width), np.inf, np.float32)
         for submap in submaps:
-            surface = self._surface(submap)
-            if isinstance(surface, np.ndarray):
-                depth = splat_depth(surface, self._grid.voxel_size_m, camera, T_world_camera)
-            else:
-                depth = self._ray_cast(surface, camera, T_world_camera)
-            nearest = np.where(depth > 0, np.minimum(nearest, depth), nearest)
+            loaded = self._load(submap)
+            depth = splat_depth(loaded.points_world, self._grid.voxel_size_m, camera, T_world_camera)
+            if loaded.mesh is not None:
+                # The mesh is exact; its vertices fill what lies between triangles that were never closed,
+                # as around the single views of a sparse visit.
+                cast = _cast(loaded.mesh, camera, T_world_camera)
+                depth = np.where(cast > 0, cast, depth)
+            seen = (depth > 0) & (depth < self._grid.max_depth_m)
+            nearest = np.where(seen, np.minimum(nearest, depth), nearest)
         return np.where(np.isfinite(nearest), nearest, 0).astype(np.float32)
 
-    def _ray_cast(
-        self,
-        volume: o3d.t.geometry.VoxelBlockGrid,
-        camera: PinholeCamera,
-        T_world_camera: NDArray[np.float64],
-    ) -> NDArray[np.float32]:
-        slots = volume.hashmap().active_buf_indices().to(o3c.int64)
-        blocks = volume.hashmap().key_tensor()[slots].numpy() if len(slots) else np.zeros((0, 3), np.int32)
-        visible = self._blocks_in_view(blocks, camera, T_world_camera)
-        if not visible.any():
-            return np.zeros((camera.height, camera.width), np.float32)
-        cast = volume.ray_cast(
-            o3c.Tensor(np.ascontiguousarray(blocks[visible])),
-            o3c.Tensor(camera.matrix),
-            o3c.Tensor(invert_rigid(T_world_camera)),
-            camera.width,
-            camera.height,
-            ["depth"],
-            1.0,
-            _NEAR_M,
-            self._grid.max_depth_m,
-            1.0,
-            self._grid.truncation_voxels,
-        )
-        return cast["depth"].numpy()[..., 0]
-
-    def _blocks_in_view(
-        self, blocks: NDArray[np.int32], camera: PinholeCamera, T_world_camera: NDArray[np.float64]
-    ) -> NDArray[np.bool_]:
-        edge_m = BLOCK_RESOLUTION * self._grid.voxel_size_m
-        centres = (blocks + 0.5) * edge_m - T_world_camera[:3, 3]
-        pixels, depth = camera.project(centres @ T_world_camera[:3, :3])
-        margin = 1.5 * edge_m * camera.fx / np.maximum(depth, edge_m)
-        inside = (pixels > -margin[:, None]).all(axis=1)
-        inside &= (pixels[:, 0] < camera.width + margin) & (pixels[:, 1] < camera.height + margin)
-        return inside & (depth > -edge_m) & (depth < self._grid.max_depth_m + edge_m)
-
-    def _surface(self, submap: int) -> Surface:
+    def _load(self, submap: int) -> LoadedSubmap:
         if submap in self._loaded:
             self._loaded.move_to_end(submap)
             return self._loaded[submap]
         with np.load(self.path(submap), allow_pickle=False) as file:
-            arrays = dict(file)
-        self._loaded[submap] = arrays["points_world"] if "points_world" in arrays else self._volume(arrays)
+            points, triangles = file["points_world"], file.get("triangles", np.zeros((0, 3), np.int32))
+        mesh = None
+        if len(triangles):
+            mesh = o3d.t.geometry.RaycastingScene(CAST_THREADS)
+            mesh.add_triangles(o3c.Tensor(points), o3c.Tensor(triangles.astype(np.uint32)))
+        self._loaded[submap] = LoadedSubmap(points, mesh)
         while len(self._loaded) > _CACHED_SUBMAPS:
             self._loaded.popitem(last=False)
         return self._loaded[submap]
 
-    def _volume(self, arrays: dict[str, NDArray[Any]]) -> o3d.t.geometry.VoxelBlockGrid:
-        blocks = arrays["blocks"]
-        volume = _new_volume(self._grid.voxel_size_m, max(64, len(blocks)))
-        if len(blocks):
-            slots, _ = volume.hashmap().activate(o3c.Tensor(blocks))
-            rows = slots.to(o3c.int64)
-            volume.attribute("tsdf")[rows] = o3c.Tensor(arrays["tsdf"])
-            volume.attribute("weight")[rows] = o3c.Tensor(arrays["weight"])
-        return volume
+
+def _cast(
+    mesh: o3d.t.geometry.RaycastingScene, camera: PinholeCamera, T_world_camera: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """Depth of a mesh; 0 where a ray meets nothing.
+
+    VoxelBlockGrid.ray_cast is not used: its range map depends on the order of threads, so that the same
+    view came out differently from run to run, and at odd image sizes a cast could go on forever.
+    """
+    rays = mesh.create_rays_pinhole(
+        o3c.Tensor(camera.matrix), o3c.Tensor(invert_rigid(T_world_camera)), camera.width, camera.height
+    )
+    # Rays of a pinhole camera have unit length along z: the distance to the hit is the depth.
+    depth = mesh.cast_rays(rays)["t_hit"].numpy()
+    return np.where(np.isfinite(depth) & (depth > _NEAR_M), depth, 0).astype(np.float32)
 
 
-def _new_volume(voxel_size_m: float, blocks: int = 4096) -> o3d.t.geometry.VoxelBlockGrid:
+def _in_canonical_order(
+    vertices: NDArray[np.float32], triangles: NDArray[np.integer]
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """The same mesh in an order that follows from its geometry; threads extract it in any order."""
+    order = np.lexsort(vertices.T[::-1])
+    place = np.empty(len(order), np.int32)
+    place[order] = np.arange(len(order), dtype=np.int32)
+    renumbered = place[triangles] if len(triangles) else np.zeros((0, 3), np.int32)
+    return vertices[order], renumbered[np.lexsort(renumbered.T[::-1])]
+
+
+def _new_volume(voxel_size_m: float) -> o3d.t.geometry.VoxelBlockGrid:
+    one = o3c.SizeVector([1])
     return o3d.t.geometry.VoxelBlockGrid(
-        ("tsdf", "weight"), (o3c.float32, o3c.float32), ((1), (1)), voxel_size_m, BLOCK_RESOLUTION, blocks
+        ("tsdf", "weight"), (o3c.float32, o3c.float32), (one, one), voxel_size_m, BLOCK_RESOLUTION, _BLOCKS
     )
