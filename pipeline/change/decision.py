@@ -133,6 +133,8 @@ def decide_by_evidence(
     """
     visits = (previous, current)
     changed = [(visit.log_odds > 0) & visit.is_met for visit in visits]
+    for of_visit in changed:
+        of_visit[0] = False  # background is no object, however much of it looks changed
     labels = [
         np.where(visit.objects.coverage >= settings.nu_min, ChangeLabel.STATIC, ChangeLabel.UNKNOWN)
         for visit in visits
@@ -160,7 +162,9 @@ def _same_place(
     settings: ChangeSettings,
 ) -> tuple[Identity, ...]:
     """One-to-one identities of unchanged objects by the place they share."""
-    stayed = [np.flatnonzero(~c & v.is_met)[1:] for c, v in zip(changed, (previous, current), strict=True)]
+    stayed = [
+        np.flatnonzero((~c & v.is_met)[1:]) + 1 for c, v in zip(changed, (previous, current), strict=True)
+    ]
     if not len(stayed[0]) or not len(stayed[1]):
         return ()
     shared = overlap[np.ix_(stayed[0] - 1, stayed[1] - 1)]

@@ -1,0 +1,243 @@
+"""Equation 8 and the decisions built on it, on objects whose evidence is written down by hand."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from pipeline.association.accumulation import AccumulatedAssociation
+from pipeline.association.aggregation import MatchEvidence
+from pipeline.association.reassociation import FoundAgain
+from pipeline.change.decision import (
+    NOT_MET,
+    Decision,
+    VisitEvidence,
+    decide_by_association,
+    decide_by_evidence,
+)
+from pipeline.change.evidence import ObjectEvidence
+from pipeline.change.labels import labels_from_association
+from pipeline.change.replaced import bounds_overlap, find_replaced
+from pipeline.result import ChangeLabel as L
+from pipeline.settings import AssociationSettings, ChangeSettings
+
+GATES = AssociationSettings(tau_sigma=0.3, tau_s=0.85)
+CHANGE = ChangeSettings(tau_d_m=0.1, nu_min=0.5, vacated_share=0.4, same_place_overlap=0.1)
+
+
+def eq8(pairs, x0, x1, nu0, nu1) -> tuple[list[int], list[int]]:
+    at0, at1 = (np.array([[x, 0, 0] for x in xs], float).reshape(-1, 3) for xs in (x0, x1))
+    labels = labels_from_association(pairs, at0, at1, np.array(nu0, float), np.array(nu1, float), 0.1, 0.5)
+    return labels[0].tolist(), labels[1].tolist()
+
+
+def test_eq8_every_branch_by_hand() -> None:
+    # Previous: 0 stays, 1 moves by 0.5 m, 2 is gone, 3 was never looked at again. Current likewise.
+    labels = eq8([(0, 1), (1, 0)], [0, 1, 2, 3], [1.5, 0.05, 5, 6], [1, 1, 0.8, 0.4], [1, 1, 0.8, 0.4])
+
+    assert labels[0] == [L.STATIC, L.MOVED, L.DISAPPEARED, L.UNKNOWN]
+    assert labels[1] == [L.MOVED, L.STATIC, L.APPEARED, L.UNKNOWN]
+
+
+@pytest.mark.parametrize(("x", "label"), [(0.1, L.STATIC), (0.1001, L.MOVED)])
+def test_eq8_displacement_threshold_belongs_to_static(x: float, label: L) -> None:
+    assert eq8([(0, 0)], [0.0], [x], [1], [1]) == ([label], [label])
+
+
+@pytest.mark.parametrize(("nu", "label"), [(0.5, L.DISAPPEARED), (0.4999, L.UNKNOWN)])
+def test_eq8_coverage_threshold_belongs_to_the_decision(nu: float, label: L) -> None:
+    assert eq8([], [0.0], [], [nu], []) == ([label], [])
+
+
+def test_eq8_matched_objects_need_no_coverage() -> None:
+    assert eq8([(0, 0)], [0.0], [0.0], [0.1], [0.1]) == ([L.STATIC], [L.STATIC])
+
+
+def visit(
+    x: list[float],
+    coverage: list[float] | float = 1.0,
+    seen_through: list[float] | float = 0.0,
+    changed: list[bool] | bool = False,
+    is_met: list[bool] | bool = True,
+    background: tuple[float, bool] = (-5.0, True),
+) -> VisitEvidence:
+    """Objects at the given places along x; ``background`` = its log odds and whether it was met."""
+    n = len(x)
+
+    def column(values: object, first: float) -> np.ndarray:
+        return np.concatenate([[first], np.broadcast_to(np.asarray(values, float), n)])
+
+    given = {
+        "voxel_count": np.full(n + 1, 100),
+        "coverage": column(coverage, 1.0),
+        "seen_through": column(seen_through, 0.9 if background[0] > 0 else 0.0),
+        "compared_count": np.full(n + 1, 50),
+        "texture_correlation": np.ones(n + 1),
+        "centroid_world": np.array([[-9.0, 0, 0], *([place, 0, 0] for place in x)]),
+    }
+    fields = {f.name: given.get(f.name, np.zeros(n + 1)) for f in dataclasses.fields(ObjectEvidence)}
+    log_odds = np.where(column(changed, 0) > 0, 5.0, -5.0)
+    log_odds[0] = background[0]
+    return VisitEvidence(ObjectEvidence(**fields), log_odds, column(is_met, background[1]) > 0)
+
+
+def association(n: int, m: int, links: dict[tuple[int, int], tuple[int, float]], leaving: int = 10):
+    evidence = MatchEvidence.empty(n, m)
+    evidence.leaving_count[:] = leaving
+    for (row, column), (count, score) in links.items():
+        evidence.link_count[row, column], evidence.link_score[row, column] = count, count * score
+        evidence.arriving_count[column] += count
+    accumulated = AccumulatedAssociation(n, m, GATES)
+    accumulated.add_submap(evidence)
+    return accumulated
+
+
+def test_paper_rule_defers_case_2_until_the_last_submap() -> None:
+    before, now = visit([0.0]), visit([0.0])
+    partial = association(1, 1, {(0, 0): (4, 0.95)}, leaving=40)
+
+    early = decide_by_association(before, now, partial, CHANGE, is_final=False)
+    final = decide_by_association(before, now, partial, CHANGE, is_final=True)
+
+    assert (early.labels0[1], early.labels1[1]) == (L.UNKNOWN, L.UNKNOWN)
+    assert (final.labels0[1], final.labels1[1]) == (L.DISAPPEARED, L.APPEARED)
+
+
+def test_paper_rule_labels_lookalikes_changed_at_once() -> None:
+    alike = association(1, 1, {(0, 0): (9, 0.6)})
+
+    decision = decide_by_association(visit([0.0]), visit([0.0]), alike, CHANGE, is_final=False)
+
+    assert (decision.labels0[1], decision.labels1[1]) == (L.DISAPPEARED, L.APPEARED)
+    assert decision.identities == ()
+
+
+def test_paper_rule_ties_identities_by_association() -> None:
+    decision = decide_by_association(
+        visit([0.0, 3.0]), visit([3.4]), association(2, 1, {(1, 0): (9, 0.9)}), CHANGE, is_final=True
+    )
+
+    assert decision.labels0.tolist() == [L.STATIC, L.DISAPPEARED, L.MOVED]
+    assert decision.labels1.tolist() == [L.STATIC, L.MOVED]
+    assert [(i.previous, i.current) for i in decision.identities] == [(2, 1)]
+    assert decision.confidence1[1] == pytest.approx(0.9)
+
+
+def by_evidence(before, now, overlap=None, links=None, found=()) -> Decision:
+    n, m = before.count, now.count
+    overlap = np.zeros((n, m)) if overlap is None else np.array(overlap, float)
+    return decide_by_evidence(
+        before,
+        now,
+        overlap,
+        association(n, m, links or {}),
+        lambda left, taken: [f for f in found if f.previous in left and f.current in taken],
+        CHANGE,
+    )
+
+
+def test_evidence_rule_by_hand() -> None:
+    # Previous: 1 stays, 2 is gone, 3 out of sight, 4 leaves. Current: 1 stays, 2 is new, 3 is where 4 went.
+    before = visit(
+        [0, 1, 2, 3],
+        coverage=[1, 1, 0.2, 1],
+        seen_through=[0, 0.9, 0, 0.9],
+        changed=[False, True, False, True],
+    )
+    now = visit([0, 5, 7], seen_through=[0, 0.1, 0.9], changed=[False, True, True])
+    overlap = np.zeros((4, 3))
+    overlap[0, 0] = 0.7
+
+    decision = by_evidence(before, now, overlap, found=[FoundAgain(4, 3, 0.8, 0.9)])
+
+    assert decision.labels0.tolist() == [L.STATIC, L.STATIC, L.DISAPPEARED, L.UNKNOWN, L.MOVED]
+    assert decision.labels1.tolist() == [L.STATIC, L.STATIC, L.APPEARED, L.MOVED]
+    assert {(i.previous, i.current) for i in decision.identities} == {(1, 1), (4, 3)}
+    for confidence in (decision.confidence0, decision.confidence1):
+        assert ((confidence >= 0) & (confidence <= 1)).all()
+
+
+def test_object_first_thought_gone_is_found_again_by_the_association() -> None:
+    before = visit([0.0], seen_through=0.9, changed=True)
+    now = visit([2.0], seen_through=0.9, changed=True)
+
+    decision = by_evidence(before, now, links={(0, 0): (8, 0.95)})
+
+    assert (decision.labels0[1], decision.labels1[1]) == (L.MOVED, L.MOVED)
+
+
+def test_object_whose_place_was_not_seen_empty_did_not_move() -> None:
+    before = visit([0.0], seen_through=0.9, changed=True)
+    now = visit([2.0], seen_through=0.1, changed=True)  # something stood here before
+
+    decision = by_evidence(before, now, links={(0, 0): (8, 0.95)}, found=[FoundAgain(1, 1, 0.9, 0.9)])
+
+    assert (decision.labels0[1], decision.labels1[1]) == (L.DISAPPEARED, L.APPEARED)
+    assert decision.identities == ()
+
+
+def test_same_place_identities_are_one_to_one() -> None:
+    decision = by_evidence(visit([0, 0.1]), visit([0.0]), [[0.6], [0.5]])
+
+    assert [(i.previous, i.current) for i in decision.identities] == [(1, 1)]
+
+
+def test_objects_not_met_yet_have_no_label_and_no_identity() -> None:
+    decision = by_evidence(visit([0.0]), visit([0.0], is_met=False), [[0.9]])
+
+    assert decision.labels1.tolist() == [L.STATIC, NOT_MET]
+    assert decision.identities == ()
+
+
+@pytest.mark.parametrize("background", [(5.0, True), (-5.0, False), (5.0, False)])
+def test_background_is_no_object_whatever_its_evidence(background: tuple[float, bool]) -> None:
+    # A background that changed, or that nobody met yet, once cost the first object its identity.
+    before = visit([0.0, 4.0], background=background)
+    now = visit([0.0, 4.0], background=background)
+    seen: list[tuple[list[int], list[int]]] = []
+
+    decision = decide_by_evidence(
+        before,
+        now,
+        np.diag([0.8, 0.8]),
+        association(2, 2, {}),
+        lambda left, taken: seen.append((left, taken)) or [],
+        CHANGE,
+    )
+
+    assert {(i.previous, i.current) for i in decision.identities} == {(1, 1), (2, 2)}
+    assert seen == []
+    assert decision.labels0[0] == decision.labels1[0] == L.STATIC
+
+
+def box(x: float, size: float = 1.0) -> tuple[list[float], list[float]]:
+    return [x, 0, 0], [x + size, size, size]
+
+
+def corners(*boxes: tuple[list[float], list[float]]) -> tuple[np.ndarray, np.ndarray]:
+    return np.array([low for low, _ in boxes], float), np.array([high for _, high in boxes], float)
+
+
+def test_overlap_of_bounds_is_a_share_of_the_smaller() -> None:
+    overlap = bounds_overlap(*corners(box(0), box(5)), *corners(box(0.75), box(0, 0.5)))
+
+    assert overlap == pytest.approx(np.array([[0.25, 1.0], [0.0, 0.0]]))
+
+
+def test_replaced_events_are_one_to_one_largest_overlap_first() -> None:
+    gone, new = corners(box(0), box(0.5)), corners(box(0.1), box(0.9))
+
+    events = find_replaced(*gone, *new, 0.25)
+
+    # 0-0 share 0.9; then 1-1 share 0.6 (1-0 also 0.6, but 0 is taken).
+    assert [(e.disappeared, e.appeared) for e in events] == [(0, 0), (1, 1)]
+    assert [e.overlap for e in events] == pytest.approx([0.9, 0.6])
+
+
+def test_places_that_hardly_touch_replace_nothing() -> None:
+    assert find_replaced(*corners(box(0)), *corners(box(0.8)), 0.25) == []
+    nobody = (np.zeros((0, 3)), np.zeros((0, 3)))
+    assert find_replaced(*nobody, *corners(box(0)), 0.25) == []
+    assert find_replaced(*corners(box(0)), *nobody, 0.25) == []
