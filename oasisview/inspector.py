@@ -10,21 +10,17 @@ import asyncio
 import logging
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any
 
 import viser
 
 from oasisview import events, wording
-from oasisview.catalogue import changed_labels
 from oasisview.downloads import make_download
+from oasisview.page import Choices, Page
 from oasisview.panels import queue
-from oasisview.panels.band import band_html
-from oasisview.panels.evidence import evidence_html
-from oasisview.panels.export import DOWNLOADS, export_html
-from oasisview.panels.hud import COLOURS, LAYER_WORDS, MODES, Layers, hud_html, legend_html, who_html
-from oasisview.panels.journal import journal_html
-from oasisview.panels.matrix import KINDS, cell_at, matrix_html
+from oasisview.panels.export import DOWNLOADS
+from oasisview.panels.hud import COLOURS, LAYER_WORDS, MODES, legend_html
+from oasisview.panels.matrix import KINDS, cell_at
 from oasisview.review import ConflictError
 from oasisview.scene import viewpoints
 from oasisview.scene.map_points import LABEL_RGB
@@ -38,27 +34,6 @@ from pipeline.result import ChangeLabel, MapObject
 _LABEL_OF_NAME = {name: label for label, name in LABEL_NAMES.items()}
 WIDE_WINDOW_PX = 1600
 _log = logging.getLogger(__name__)
-
-
-@dataclass
-class Choices:
-    """What one inspector chose; nothing here is shared."""
-
-    selected: int | None = None
-    session: int = 1
-    keyframe: int = 0
-    mode: str = "after"
-    wanted_mode: str = "after"  # what the person chose; a selection may need another one for a while
-    colours: str = "label"
-    layers: Layers = field(default_factory=Layers)
-    dark: bool = False
-    shown: frozenset[ChangeLabel] = field(default_factory=changed_labels)
-    swipe: bool = False
-    matrix_kind: str = "sigma"
-    cell: tuple[int, int] | None = None
-    pending_label: tuple[int, ChangeLabel] | None = None
-    conflict: str = ""
-    export_status: str = ""
 
 
 class Inspector:
@@ -81,10 +56,10 @@ class Inspector:
         self._loop = loop
         self._lock = threading.RLock()
         self._closed = False
-        self._seen_event_id = bench.decisions.last_event_id
         self.choices = Choices()
         if not self._catalogue.session(1).keyframes:
             self.choices.session = 0
+        self._page = Page(client, shell, bench, self.choices)
         self._map = MapView(
             client,
             self._catalogue,
@@ -108,7 +83,7 @@ class Inspector:
     def open(self, hello: events.Hello | None) -> None:
         """Send the whole page; ``hello`` is what the page's address asked for."""
         with self._lock:
-            self._build_panels(wide=hello is not None and hello.width_px >= WIDE_WINDOW_PX)
+            self._page.build(wide=hello is not None and hello.width_px >= WIDE_WINDOW_PX)
             self._listen()
             choices = self.choices
             self._map.build(choices.mode, choices.colours, choices.layers, dark=choices.dark)
@@ -116,16 +91,16 @@ class Inspector:
             home = self._bench.points.home
             self._client.camera.position = home.position
             self._client.camera.look_at = home.target
-            self._show_hud()
-            self._show_queue()
-            self._show_journal()
-            self._show_export()
+            self._page.show_hud()
+            self._page.show_queue()
+            self._page.show_journal()
+            self._page.show_export()
             wanted = hello.object_id if hello is not None else None
             if wanted in self._catalogue.objects:
                 self.select(wanted, fly=True)
             else:
-                self._show_evidence()
-                self._show_matrix()
+                self._page.show_evidence()
+                self._page.show_matrix()
                 self._show_band(whole=True)
                 self._fly(home)
         self._decisions.subscribe(self._on_decisions)
@@ -137,28 +112,6 @@ class Inspector:
         self._map.close()
         self._decisions.unsubscribe(self._on_decisions)
         self._bench.leave(self._client.client_id, self._on_presence)
-
-    # Panels
-
-    def _build_panels(self, *, wide: bool) -> None:
-        gui = self._client.gui
-        evidence = gui.add_panel()
-        with evidence.add_tab("Evidence"):
-            self._evidence = gui.add_html("")
-        with evidence.add_tab("Matrix"):
-            self._matrix = gui.add_html("")
-        evidence.dock_right()
-        evidence.set_width(420 if wide else 344)
-        gui.main_panel.dock_left()
-        gui.main_panel.set_width(292 if wide else 240)
-        gui.set_panel_label(self._bench.name)
-        tabs = gui.add_tab_group()
-        with tabs.add_tab("Queue"):
-            self._queue = gui.add_html("")
-        with tabs.add_tab("Journal"):
-            self._journal = gui.add_html("")
-        with tabs.add_tab("Export"):
-            self._export = gui.add_html("")
 
     def _listen(self) -> None:
         on = self._shell.on_event
@@ -221,13 +174,13 @@ class Inspector:
             self._show_where_visible(item)
             if not keep_keyframe:
                 self._choose_keyframe(item)
-            self._show_evidence()
+            self._page.show_evidence()
             self._shell.set_selection(item.object_id)
             self._show_band()
-            self._map.select(item)
+            self._map.marks.select(item)
             if fly:
                 self._fly_selected()
-            self._show_matrix()
+            self._page.show_matrix()
 
     def step(self, by: int) -> None:
         """Select the object ``by`` rows further down the queue."""
@@ -355,12 +308,12 @@ class Inspector:
     def _decide(self, object_id: int, label: ChangeLabel, reason: str) -> None:
         try:
             decision = self._decisions.decide(
-                object_id, label, who=self.user, reason=reason, seen_event_id=self._seen_event_id
+                object_id, label, who=self.user, reason=reason, seen_event_id=self._page.seen_event_id
             )
         except ConflictError as conflict:
             self._decisions.refresh()
             self.choices.conflict = str(conflict)
-            self._show_evidence()
+            self._page.show_evidence()
             return
         order = queue.queue_order(self._catalogue, self._decisions.verdicts, self.choices.shown)
         did = "accepted as" if label is self._catalogue.objects[object_id].label else "set to"
@@ -370,7 +323,7 @@ class Inspector:
         if following is not None:
             self.select(following, fly=True)
         else:
-            self._show_evidence()
+            self._page.show_evidence()
 
     def _note(self, text: str) -> None:
         item = self._selected()
@@ -387,18 +340,18 @@ class Inspector:
         with self._lock:
             if self._closed:
                 return
-            self._show_queue()
+            self._page.show_queue()
             self._map.recolour()
-            self._show_journal()
-            self._show_export()
+            self._page.show_journal()
+            self._page.show_export()
             if self.choices.selected is not None:
-                self._show_evidence()
+                self._page.show_evidence()
                 if self.choices.selected in changed:
-                    self._map.select(self._selected())
+                    self._map.marks.select(self._selected())
                     self._show_band()
 
     def _on_presence(self) -> None:
-        self._later(self._show_who)
+        self._later(self._page.show_who)
 
     def _later(self, work: Callable[[], None]) -> None:
         if self._closed or self._loop.is_closed():
@@ -420,12 +373,12 @@ class Inspector:
         with self._lock:
             self.choices.wanted_mode = mode
             self._apply_mode(mode)
-            self._map.select(self._selected())
+            self._map.marks.select(self._selected())
 
     def _apply_mode(self, mode: str) -> None:
         self.choices.mode = mode
         self._map.set_mode(mode)
-        self._show_hud()
+        self._page.show_hud()
 
     def _flip_mode(self) -> None:
         self.set_mode("after" if self.choices.mode == "before" else "before")
@@ -446,8 +399,8 @@ class Inspector:
             self.choices.dark = dark
             self._shell.set_theme(dark)
             self._map.set_theme(dark)
-            self._map.select(self._selected())
-            self._show_hud()
+            self._map.marks.select(self._selected())
+            self._page.show_hud()
             self._show_band()
 
     def _fly(self, viewpoint: viewpoints.Viewpoint) -> None:
@@ -482,82 +435,27 @@ class Inspector:
     def _toggle_filter(self, name: str) -> None:
         with self._lock:
             self.choices.shown = self.choices.shown ^ {_LABEL_OF_NAME[name]}
-            self._show_queue()
+            self._page.show_queue()
 
     def _toggle_swipe(self) -> None:
         with self._lock:
             self.choices.swipe = not self.choices.swipe
-            self._show_evidence()
+            self._page.show_evidence()
 
     def _set_matrix_kind(self, kind: str) -> None:
         with self._lock:
             self.choices.matrix_kind = kind
-            self._show_matrix()
+            self._page.show_matrix()
 
     def _click_matrix(self, click: events.PixelClick) -> None:
         with self._lock:
             self.choices.cell = cell_at(self._catalogue.result.score_matrix.sigma.shape, click.u, click.v)
-            self._show_matrix()
-
-    def _show_hud(self) -> None:
-        choices = self.choices
-        self._shell.set_html(
-            "hud", hud_html(choices.mode, choices.colours, choices.layers, dark=choices.dark)
-        )
-        self._shell.set_html("legend", legend_html(choices.colours, choices.mode))
-
-    def _show_who(self) -> None:
-        others = self._bench.others(self._client.client_id)
-        self._shell.set_html("who", who_html(self.user, others, self._bench.name))
-
-    def _show_queue(self) -> None:
-        self._queue.content = queue.queue_html(self._catalogue, self._decisions.verdicts, self.choices.shown)
-
-    def _show_evidence(self) -> None:
-        choices = self.choices
-        # What is on the screen is what a decision is based on: newer ones of others are a conflict.
-        self._seen_event_id = self._decisions.last_event_id
-        selected = choices.selected
-        self._evidence.content = evidence_html(
-            self._catalogue,
-            selected,
-            self._decisions.verdicts.get(selected) if selected is not None else None,
-            swipe=choices.swipe,
-            can_undo=self._decisions.can_undo(self.user),
-            can_redo=self._decisions.can_redo(self.user),
-            conflict=choices.conflict or self._decisions.disagreement(selected),
-        )
-
-    def _show_matrix(self) -> None:
-        choices = self.choices
-        self._matrix.content = matrix_html(
-            self._catalogue, choices.matrix_kind, choices.selected, choices.cell
-        )
-
-    def _show_journal(self) -> None:
-        self._journal.content = journal_html(self._decisions.history())
-
-    def _show_export(self) -> None:
-        listed = [i for i in self._catalogue.objects.values() if i.label in changed_labels()]
-        reviewed = sum(item.object_id in self._decisions.verdicts for item in listed)
-        self._export.content = export_html(reviewed, len(listed), self.choices.export_status)
+            self._page.show_matrix()
 
     def _show_band(self, *, whole: bool = False) -> None:
-        choices = self.choices
-        content = band_html(
-            self._catalogue,
-            choices.session,
-            choices.keyframe,
-            choices.selected,
-            self._decisions.label_of,
-            dark=choices.dark,
-        )
-        if whole:
-            self._shell.set_html("band", content)
-        else:
-            self._shell.swap_band(content)
-        if self._catalogue.session(choices.session).keyframes:
-            self._map.show_keyframe(choices.session, choices.keyframe)
+        self._page.show_band(whole=whole)
+        if self._catalogue.session(self.choices.session).keyframes:
+            self._map.marks.show_keyframe(self.choices.session, self.choices.keyframe)
 
     def _download(self, format_name: str) -> None:
         download = next(d for d in DOWNLOADS if d.format == format_name)
@@ -573,4 +471,4 @@ class Inspector:
     def _say_export(self, status: str) -> None:
         with self._lock:
             self.choices.export_status = status
-            self._show_export()
+            self._page.show_export()

@@ -57,6 +57,17 @@ class MapPoints:
     total_points: int
     shown_points: int
 
+    @property
+    def frustum_depth_m(self) -> float:
+        """How deep cameras are drawn: in proportion to the map's detail."""
+        return float(np.clip(8 * self.point_size_m, 0.12, 1.0))
+
+    def local_pose(self, T_world_camera: NDArray[np.floating]) -> NDArray[np.float64]:
+        """A camera pose relative to ``origin``."""
+        local = np.array(T_world_camera, np.float64)
+        local[:3, 3] -= self.origin
+        return local
+
 
 def load_map_points(result: Result, max_points: int = MAX_POINTS) -> MapPoints:
     """Read and thin the maps of a result; seconds for many millions of points, so keep it off the loop."""

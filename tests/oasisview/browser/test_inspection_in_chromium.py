@@ -19,7 +19,7 @@ from oasisview.inspector import Inspector
 from pipeline.result import ChangeLabel
 
 # Software rendering costs by the pixel.
-SMALL_WINDOW = (1120, 700)
+SMALL_WINDOW, TINY_WINDOW = (1120, 700), (760, 520)
 OpenViewer = Callable[..., ViewerPage]
 
 
@@ -34,8 +34,8 @@ def app(small_result_path: Path) -> Iterator[RunningApp]:
 def opened(app: RunningApp, open_viewer: OpenViewer) -> Callable[..., ViewerPage]:
     """Opens a page of the app and waits until the result is before the inspector."""
 
-    def open_it(query: str = "") -> ViewerPage:
-        view = open_viewer(app.server, query=query, size=SMALL_WINDOW)
+    def open_it(size: tuple[int, int] = SMALL_WINDOW) -> ViewerPage:
+        view = open_viewer(app.server, size=size)
         view.page.wait_for_selector(".oa-row")
         view.page.wait_for_selector("#oa-band img")
         view.wait_node("/map/1/objects")
@@ -158,7 +158,7 @@ def centre_of_object(view: ViewerPage, result, app: RunningApp, object_id: int) 
 def test_an_override_is_on_disk_recolours_every_page_and_survives_undo_and_reload(
     app, opened, small_result_path
 ) -> None:
-    mine, theirs = opened(), opened()
+    mine, theirs = opened(), opened(TINY_WINDOW)
     before = object_colour(app, theirs, 12)
     select(mine, 12)
     mine.page.keyboard.press("1")
