@@ -305,9 +305,6 @@ class _Run:
             "quality": {
                 "voxel_size_m": round(visits[0].geometry.surface.voxel_size_m, 6),
                 "appearance_scale_log": round(conclusion.appearance_scale, 4),
-                "appearance_used": bool(
-                    conclusion.appearance_scale <= self._settings.change.reliable_appearance_scale
-                ),
             },
             "warnings": self._warnings,
             "timings_s": self._timings_s,

@@ -175,15 +175,13 @@ class ChangeSettings:
     rule: Literal["evidence", "paper"] = setting(
         "evidence", "evidence = the place itself must have changed; paper = Eq. 8 alone"
     )
-    bias: float = setting(-5.3, "log odds of a change before any evidence")
-    seen_through_weight: float = setting(12.9, "log odds for a place that was seen to be empty")
-    residual_weight: float = setting(1.85, "log odds per unit of median colour residual")
-    tail_weight: float = setting(7.0, "log odds for a surface whose colours no lighting explains")
-    texture_weight: float = setting(4.1, "log odds for a printed surface whose print differs")
-    reliable_appearance_scale: float = setting(
-        0.08, "colour spread between the visits up to which appearance counts fully", unit="log units"
-    )
-    min_compared_voxels: int = setting(8, "voxels that must be compared before appearance counts")
+    # Weights of change_score, fitted by benchmarks/fit_change_score.py on scenes that no table reports.
+    bias: float = setting(-3.62, "log odds of a change before any evidence")
+    seen_through_weight: float = setting(12.1, "log odds for a place that was seen to be empty")
+    dissimilarity_weight: float = setting(1.01, "log odds per spread of patch dissimilarity")
+    residual_weight: float = setting(0.48, "log odds per spread of the median colour residual")
+    texture_weight: float = setting(1.26, "log odds per spread of lost texture correlation")
+    tail_weight: float = setting(1.15, "log odds per spread of the share of unexplained colours")
     vacated_share: float = setting(0.4, "a move leaves a place, and takes one, seen to be empty this much")
     same_place_overlap: float = setting(0.1, "overlap from which two unchanged objects are one")
     moved_size_ratio: float = setting(2.0, "a moved object keeps its size within this factor")

@@ -3,6 +3,9 @@
 The paper labels whatever finds no partner as changed (Eq. 8). With hand-made features and masks many
 unchanged pieces of furniture find none, so that here the place itself has to speak: it was seen to be
 empty, or something that looks different stands there.
+
+How different unchanged things look depends on the place: on its light, its textures, the error of its
+poses. So appearance is judged against the other objects of the same two visits, most of which stayed.
 """
 
 from __future__ import annotations
@@ -13,38 +16,82 @@ from numpy.typing import NDArray
 from pipeline.change.evidence import ObjectEvidence
 from pipeline.settings import ChangeSettings
 
-_MAX_MEDIAN_RESIDUAL = 1.2
+# Objects that stand for "unchanged" when a place is judged by the others: not seen through, well compared.
+_REFERENCE_SEEN_THROUGH = 0.3
+_REFERENCE_VOXELS = 30
+# As many made-up objects as this keep visits of few objects from being judged by themselves alone.
+_PRIOR_OBJECTS = 10
+# An object of this many compared voxels counts half: small ones scatter.
+_RELIABLE_VOXELS = 150
+_CLIP_LOW, _CLIP_HIGH = -3.0, 8.0
+_TAIL_FLOOR = 0.02
+_FULL_TEXTURE = 0.1
+# Median and robust spread of unchanged objects over the development scenes, and the least spread allowed.
+_DISSIMILARITY = (-2.1, 0.7, 0.2)
+_RESIDUAL = (0.16, 0.09, 0.03)
+_TEXTURE_LOSS = (-1.4, 0.45, 0.2)
+_TAIL = (-3.4, 0.55, 0.3)
 
 
-def change_log_odds(
-    evidence: ObjectEvidence, appearance_scale: float, settings: ChangeSettings
-) -> NDArray[np.float64]:
-    """(K + 1,) log odds that an object is not at its place in the other visit; > 0 = changed.
-
-    Args:
-        appearance_scale: spread of the colour residual of the pair of visits; where appearance is noisy
-            it counts less.
-    """
-    trust = min(1.0, settings.reliable_appearance_scale / max(appearance_scale, 1e-9))
-    compared = np.minimum(1.0, evidence.compared_count / settings.min_compared_voxels)
-    # A single voxel that happens to be comparable must not decide about an object.
-    compared = np.where(evidence.compared_count >= settings.min_compared_voxels, compared, 0.0)
-    median = np.minimum(evidence.median_residual, _MAX_MEDIAN_RESIDUAL)
-    texture = (1.0 - evidence.texture_correlation) * evidence.texture_weight
+def change_log_odds(evidence: ObjectEvidence, settings: ChangeSettings) -> NDArray[np.float64]:
+    """(K + 1,) log odds that an object is not at its place in the other visit; > 0 = changed."""
     return (
         settings.bias
         + settings.seen_through_weight * evidence.seen_through
-        + compared
-        * (
-            settings.residual_weight * trust * median
-            + settings.tail_weight * evidence.tail_share
-            + settings.texture_weight * trust * texture
-        )
+        + settings.dissimilarity_weight * _relative_dissimilarity(evidence)
+        + settings.residual_weight * _relative(evidence, evidence.median_residual, _RESIDUAL)
+        + settings.texture_weight
+        * _relative(evidence, _texture_loss(evidence), _TEXTURE_LOSS)
+        * _textured(evidence)
+        + settings.tail_weight * _relative(evidence, np.log(evidence.tail_share + _TAIL_FLOOR), _TAIL)
     )
 
 
 def appearance_change(evidence: ObjectEvidence) -> NDArray[np.float64]:
     """(K + 1,) how differently the place looks, in [0, 1], for people; NaN where it was not compared."""
-    texture = np.clip(1.0 - evidence.texture_correlation, 0, 1) * evidence.texture_weight
+    texture = np.clip(1.0 - evidence.texture_correlation, 0, 1) * _textured(evidence)
     change = np.maximum(evidence.tail_share, np.maximum(texture, 1 - np.exp(-evidence.median_residual)))
     return np.where(evidence.compared_count > 0, np.clip(change, 0, 1), np.nan)
+
+
+def _texture_loss(evidence: ObjectEvidence) -> NDArray[np.float64]:
+    # Fisher's transform: a correlation of 0.95 instead of 0.99 says as much as 0.4 instead of 0.8.
+    return -np.arctanh(np.clip(evidence.texture_correlation, -0.9, 0.99))
+
+
+def _textured(evidence: ObjectEvidence) -> NDArray[np.float64]:
+    """How much the texture may count: nothing on plain surfaces, all on printed ones."""
+    return np.clip(evidence.texture / _FULL_TEXTURE, 0, 1)
+
+
+def _relative_dissimilarity(evidence: ObjectEvidence) -> NDArray[np.float64]:
+    values = np.nan_to_num(evidence.dissimilarity)
+    return _relative(evidence, values, _DISSIMILARITY, np.isfinite(evidence.dissimilarity))
+
+
+def _relative(
+    evidence: ObjectEvidence,
+    values: NDArray[np.float64],
+    prior: tuple[float, float, float],
+    is_known: NDArray[np.bool_] | None = None,
+) -> NDArray[np.float64]:
+    """Values in robust spreads from the unchanged objects of these visits, less for objects of few voxels.
+
+    Args:
+        prior: median and spread to start from, and the least spread.
+        is_known: where a value exists; elsewhere the outcome is 0 (no evidence).
+    """
+    known = evidence.compared_count > 0 if is_known is None else is_known & (evidence.compared_count > 0)
+    reference = known & (evidence.seen_through < _REFERENCE_SEEN_THROUGH)
+    reference &= evidence.compared_count >= _REFERENCE_VOXELS
+    reference[:1] = False
+    centre, spread, least = prior
+    count = int(reference.sum())
+    if count:
+        own = float(np.median(values[reference]))
+        own_spread = 1.48 * float(np.median(np.abs(values[reference] - own)))
+        share = count / (count + _PRIOR_OBJECTS)
+        centre, spread = share * own + (1 - share) * centre, share * own_spread + (1 - share) * spread
+    scores = np.clip((values - centre) / max(spread, least), _CLIP_LOW, _CLIP_HIGH)
+    weight = evidence.compared_count / (evidence.compared_count + _RELIABLE_VOXELS)
+    return np.where(known, scores * weight, 0.0)

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from pipeline.change.appearance import MIN_COMPARED_VOXELS, AppearanceResidual
 
 # Residuals beyond this many spreads of the pair of visits, and beyond this, belong to another surface.
-TAIL_SPREADS = 5.0
+TAIL_SPREADS = 3.0
 TAIL_RESIDUAL = 0.4
-_MIN_TEXTURE, _TEXTURE_RANGE = 0.04, 0.08
 
 
 @dataclass(frozen=True)
@@ -66,11 +65,6 @@ class ObjectEvidence:
         for name, values in columns.items():
             rows[name] = values[1:]
         return rows
-
-    @property
-    def texture_weight(self) -> NDArray[np.float64]:
-        """How much the texture correlation may count: nothing on plain surfaces, all on printed ones."""
-        return np.clip((self.texture - _MIN_TEXTURE) / _TEXTURE_RANGE, 0, 1)
 
 
 def object_evidence(

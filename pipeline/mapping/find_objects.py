@@ -48,7 +48,7 @@ def find_objects(
         tokens = None if generator.masks_are_tracks else mask_tokens(masks, features(k), extractor)
         merger.add(masks, voxels, tokens)
     objects = remove_noise(surface, merger.finish())
-    objects = refine_by_change(surface, objects, is_seen_through, settings.discovery.min_voxels)
+    objects = refine_by_change(surface, objects, is_seen_through, settings.discovery.change_region_voxels)
     return number_instances(geometry, objects, settings.discovery.min_voxels, settings.discovery.min_views)
 
 
