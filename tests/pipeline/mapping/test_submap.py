@@ -193,7 +193,6 @@ def test_depth_source_chooses_the_kind_of_submap(tmp_path: Path, source: str) ->
     geometry = map_in_memory(session, tmp_path, Settings(), VOXEL_M)
 
     with np.load(tmp_path / "submap_0000.npz", allow_pickle=False) as file:
-        assert ("points_world" in file) is (source == "lidar")
         assert ("triangles" in file) is (source == "sensor")
     rendered = geometry.submaps.render_depth((0,), SMALL_CAMERA, poses[1])
     known = rendered > 0
