@@ -64,9 +64,7 @@ class GradientColourDescriptor:
         gain = np.ones(COLOUR_CHANNELS) if light is None else np.exp(light)
         return self._unit_vectors(previous, np.ones(COLOUR_CHANNELS)), self._unit_vectors(current, gain)
 
-    def _unit_vectors(
-        self, stored: NDArray[np.float16], gain: NDArray[np.float64]
-    ) -> NDArray[np.float32]:
+    def _unit_vectors(self, stored: NDArray[np.float16], gain: NDArray[np.float64]) -> NDArray[np.float32]:
         patches = stored.reshape(-1, stored.shape[-1]).astype(np.float32)
         colour = np.clip(patches[:, :COLOUR_CHANNELS] * gain.astype(np.float32) / 255.0, 0, 1)
         lab = cv2.cvtColor(colour[:, None].astype(np.float32), cv2.COLOR_BGR2Lab)[:, 0]
@@ -146,7 +144,11 @@ def _gradient_histograms(grey: NDArray[np.uint8], grid: tuple[int, int]) -> NDAr
             )
     flat = out.reshape(rows, columns, -1)
     flat = np.sqrt(flat / (np.linalg.norm(flat, axis=-1, keepdims=True) + CONTRAST_FLOOR))
-    return flat / np.maximum(np.linalg.norm(flat, axis=-1, keepdims=True), 1e-6)
+    length = np.linalg.norm(flat, axis=-1, keepdims=True)
+    # A patch without any gradient (plain or overexposed) has no preferred orientation; a zero vector would
+    # make an unchanged white wall look changed.
+    even = np.float32(1 / np.sqrt(flat.shape[-1]))
+    return np.where(length > 1e-6, flat / np.maximum(length, 1e-6), even)
 
 
 def _random_frequencies(count: int) -> NDArray[np.float32]:
