@@ -174,7 +174,7 @@ def _geometric(
     covisible: tuple[CovisiblePair, ...],
     own_is_current: bool,
 ) -> NDArray[np.float32]:
-    step = GEOMETRIC_HEATMAP_STRIDE // own.stride
+    step = max(1, GEOMETRIC_HEATMAP_STRIDE // own.stride)
     depth = own.store.depth(k)[::step, ::step]
     camera = own.strided_camera(k).strided(step)
     submaps = tuple(sorted({other.keyframes[pair.other_keyframe].submap for pair in covisible}))

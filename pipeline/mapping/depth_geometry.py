@@ -45,12 +45,18 @@ def depth_geometry(
         min_incidence_cosine: surfaces seen flatter than this are unreliable.
     """
     points = camera.backproject(depth)
-    smoothed = cv2.blur(points, (3, 3))
+    measured = depth > 0
+    # Means over measured pixels only: holes are the origin, and would tilt every normal around them.
+    share = cv2.blur(measured.astype(np.float32), (3, 3))
+    smoothed = cv2.blur(points, (3, 3)) / np.maximum(share, 1e-3)[..., None]
+    known = share > 1e-3
     step = NORMAL_STEP_PX
     horizontal = np.zeros_like(points)
     vertical = np.zeros_like(points)
     horizontal[:, step:-step] = smoothed[:, 2 * step :] - smoothed[:, : -2 * step]
     vertical[step:-step] = smoothed[2 * step :] - smoothed[: -2 * step]
+    horizontal[:, step:-step][~(known[:, 2 * step :] & known[:, : -2 * step])] = 0
+    vertical[step:-step][~(known[2 * step :] & known[: -2 * step])] = 0
     normals = _cross(horizontal, vertical)
     length = np.sqrt(np.einsum("hwc,hwc->hw", normals, normals))
     normals /= np.maximum(length, 1e-12)[..., None]
@@ -59,7 +65,6 @@ def depth_geometry(
     normals *= np.where(cosine > 0, -1, 1).astype(np.float32)[..., None]
     cosine = np.abs(cosine)
 
-    measured = depth > 0
     nearest = cv2.erode(np.where(measured, depth, np.float32(_FAR_M)), _KERNEL)
     farthest = cv2.dilate(depth, _KERNEL)
     explained = EDGE_SLANT_FACTOR * depth / np.float32(camera.fx) / np.maximum(cosine, 0.12)
