@@ -73,8 +73,8 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
             x = (number + 0.5 - bays / 2) * bay + rng.normal(0, 0.08)
             T = pose(x, row + rng.normal(0, 0.12), 0, heading + rng.normal(0, 0.02))
             spots.append((T, vehicles.car(shop, family, shop.near(paint, 8))))
-    share = shop.between(0.08, 0.16)
-    dealt = fates(rng, len(spots), moved=share, spare=share, disappeared=0.1, appeared=0.1, replaced=0.2)
+    share = shop.between(0.14, 0.19)
+    dealt = fates(rng, len(spots), moved=share, spare=share, disappeared=0.1, appeared=0.1, replaced=0.22)
     free = [T for (T, _), fate in zip(spots, dealt, strict=True) if fate == "spare"]
     for (T, car), fate in zip(spots, dealt, strict=True):
         if fate == "spare":

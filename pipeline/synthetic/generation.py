@@ -117,8 +117,10 @@ def record(
         reported = misplace(scene.paths[visit], sensor, rng)
         for index, T_world_camera in enumerate(scene.paths[visit]):
             view = renderers[visit].view(scene.camera, T_world_camera)
-            rgb = expose(view, scene.lighting[visit].exposure, sensor, rng)
-            archive.add(rgb, measure(view, sensor, rng), reported[index], index * 0.5)
+            # Noise of its own for every frame: the order in which frames are made does not matter.
+            noise = np.random.default_rng([SCENES.index(scene.name), scene.seed, 2 + visit, index])
+            rgb = expose(view, scene.lighting[visit].exposure, sensor, noise)
+            archive.add(rgb, measure(view, sensor, noise), reported[index], index * 0.5)
             within = view.depth[::_TRUTH_STRIDE, ::_TRUTH_STRIDE]
             valid = (within > sensor.min_range_m) & (within < sensor.max_range_m)
             in_camera = scene.camera.strided(_TRUTH_STRIDE).backproject(np.where(valid, within, 0))[valid]

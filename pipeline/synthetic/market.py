@@ -85,8 +85,8 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
         else:
             spots.append((T, thing))
     arriving = rng.random() < 0.5
-    shares = {"appeared": 0.45, "disappeared": 0.07} if arriving else {"appeared": 0.07, "disappeared": 0.45}
-    dealt = fates(rng, len(spots), moved=0.16, spare=0.14, replaced=0.07, **shares)
+    shares = {"appeared": 0.28, "disappeared": 0.05} if arriving else {"appeared": 0.05, "disappeared": 0.28}
+    dealt = fates(rng, len(spots), moved=0.31, spare=0.25, replaced=0.09, **shares)
     free = [(T, thing.radius) for (T, thing), fate in zip(spots, dealt, strict=True) if fate == "spare"]
     for (T, thing), fate in zip(spots, dealt, strict=True):
         if fate == "spare":
@@ -94,7 +94,8 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
         goal = None
         if fate == "moved":
             fits = [i for i, (_, radius) in enumerate(free) if radius > thing.radius * 0.75]
-            goal = free.pop(fits[0])[0] if fits else None
+            # The tightest place that fits: large ones stay free for what is large.
+            goal = free.pop(min(fits, key=lambda i: free[i][1]))[0] if fits else None
         plan.deal(fate, thing, T, goal, nudge(rng, 0.05, 0.03))
 
     return SyntheticScene(

@@ -99,7 +99,7 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
                         yaw, y = rng.normal(0, 0.07), shop.between(-0.14, 0.06)
                         spots.append((centre @ pose(x + half, y, z, yaw), thing))
                     x += 2 * half + shop.between(0.05, 0.2)
-    _deal(plan, rng, spots, moved=shop.between(0.07, 0.16))
+    _deal(plan, rng, spots, moved=shop.between(0.1, 0.15))
 
     # Pallets, stacks, drums and trucks on the floor at the end of the aisle.
     floor_things: list[Prop] = []
@@ -125,7 +125,7 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
         for place, thing in zip(places, floor_things, strict=True)
         if place is not None
     ]
-    _deal(plan, rng, standing, moved=0.2)
+    _deal(plan, rng, standing, moved=0.24)
 
     return SyntheticScene(
         name="warehouse",
