@@ -98,6 +98,8 @@ def save_observation(writer: ResultWriter, observation: MutualObservation) -> No
     """Keep what the visits saw of each other."""
     parts = {"of_current": observation.of_current.to_sparse()}
     parts |= {f"submap_{number:04d}": sparse for number, sparse in enumerate(observation.by_submap)}
+    writer.save_array("observation/is_noise_0", observation.is_noise0)
+    writer.save_array("observation/is_noise_1", observation.is_noise1)
     for part, sparse in parts.items():
         for name, array in sparse.items():
             writer.save_array(f"observation/{part}/{name}", np.asarray(array))
@@ -117,7 +119,8 @@ def load_observation(
     by_submap = tuple(load(f"submap_{number:04d}") for number in range(submaps))
     for sparse in by_submap:
         of_previous.add_sparse(sparse)
-    return MutualObservation(of_current, of_previous, by_submap)
+    is_noise = [writer.load_array(f"observation/is_noise_{visit}", mmap=False) for visit in range(2)]
+    return MutualObservation(of_current, of_previous, is_noise[0], is_noise[1], by_submap)
 
 
 def save_objects(writer: ResultWriter, visit: int, objects: SessionObjects) -> None:

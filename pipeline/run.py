@@ -177,7 +177,7 @@ class _Run:
                 return checkpoint.load_observation(
                     self._writer, sizes[0], sizes[1], geometries[1].submap_count
                 )
-            total = sum(len(geometry.keyframes) for geometry in geometries)
+            total = 2 * sum(len(geometry.keyframes) for geometry in geometries)
             observation = observe(*geometries, self._settings, self._progress("observe", total))
             checkpoint.save_observation(self._writer, observation)
             return observation
@@ -186,6 +186,7 @@ class _Run:
         self, geometries: tuple[SessionGeometry, SessionGeometry], observation: MutualObservation
     ) -> tuple[SessionObjects, SessionObjects]:
         observed = (observation.of_previous, observation.of_current)
+        is_noise = (observation.is_noise0, observation.is_noise1)
         found = []
         with self._stage("objects") as is_done:
             for visit, geometry in enumerate(geometries):
@@ -195,6 +196,7 @@ class _Run:
                 objects = find_objects(
                     geometry,
                     observed[visit].is_seen_through(self._settings.observation),
+                    is_noise[visit],
                     mask_generator(self._settings),
                     self._extractor,
                     self._features(visit, geometry),

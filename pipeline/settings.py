@@ -143,6 +143,9 @@ class ObservationSettings:
     tolerance_per_metre: float = setting(0.006, "growth of the agreement with depth", unit="m/m")
     min_free: int = setting(2, "keyframes that must see through a voxel that others hit")
     free_ratio: float = setting(0.6, "share of observations that must see through")
+    own_free_ratio: float = setting(
+        0.2, "voxels that more than this share of their own visit's views see through are sensor noise"
+    )
     colour_min_cosine: float = setting(0.15, "colours are read off surfaces that face the camera so much")
 
 

@@ -10,16 +10,27 @@ from numpy.typing import NDArray
 MIN_PATCH_SHARE = 24 / 64
 
 
-def patch_owners(mask: NDArray[np.integer], grid: tuple[int, int]) -> NDArray[np.int32]:
-    """Which object each patch belongs to.
+@dataclass(frozen=True)
+class PatchShares:
+    """Which objects the patches of a keyframe show; one entry per patch and object that meet.
+
+    Attributes:
+        patch: (E,) patch number, row by row.
+        instance: (E,) object, counted from 1.
+        share: (E,) part of the patch that the object covers, in (0, 1].
+    """
+
+    patch: NDArray[np.int64]
+    instance: NDArray[np.int64]
+    share: NDArray[np.float64]
+
+
+def patch_shares(mask: NDArray[np.integer], grid: tuple[int, int]) -> PatchShares:
+    """How much of each patch each object covers.
 
     Args:
         mask: (h, w) object number of each strided pixel, 0 = none.
         grid: (H_f, W_f).
-
-    Returns:
-        (H_f * W_f,) the object that covers most of the patch, if it covers at least ``MIN_PATCH_SHARE``
-        of it; else 0.
     """
     rows, columns = grid
     height, width = mask.shape
@@ -27,16 +38,23 @@ def patch_owners(mask: NDArray[np.integer], grid: tuple[int, int]) -> NDArray[np
     column = np.arange(width) * columns // width
     patch = (row[:, None] * columns + column[None, :]).reshape(-1)
     owner = mask.reshape(-1).astype(np.int64)
-    count = int(owner.max()) + 1
+    count = int(owner.max(initial=0)) + 1
     pairs, pixels = np.unique(patch * count + owner, return_counts=True)
     patch_of, object_of = np.divmod(pairs, count)
     area = np.bincount(patch, minlength=rows * columns)
-    eligible = (object_of > 0) & (pixels >= MIN_PATCH_SHARE * area[patch_of])
-    patch_of, object_of, pixels = patch_of[eligible], object_of[eligible], pixels[eligible]
-    # Written in ascending order of pixels, so that the object with most pixels stays.
-    order = np.lexsort((-object_of, pixels))
-    owners = np.zeros(rows * columns, np.int32)
-    owners[patch_of[order]] = object_of[order]
+    inside = object_of > 0
+    return PatchShares(patch_of[inside], object_of[inside], (pixels / area[patch_of])[inside])
+
+
+def patch_owners(shares: PatchShares, patch_count: int) -> NDArray[np.int32]:
+    """(patch_count,) the object that covers most of each patch, if it covers at least ``MIN_PATCH_SHARE``
+    of it; else 0."""
+    enough = shares.share >= MIN_PATCH_SHARE
+    patch, instance, share = shares.patch[enough], shares.instance[enough], shares.share[enough]
+    # Written in ascending order of the share, so that the object with the largest one stays.
+    order = np.lexsort((-instance, share))
+    owners = np.zeros(patch_count, np.int32)
+    owners[patch[order]] = instance[order]
     return owners
 
 

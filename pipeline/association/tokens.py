@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.association.aggregation import patch_owners
+from pipeline.association.aggregation import patch_owners, patch_shares
 
 VIEWS_PER_OBJECT = 4
 
@@ -46,6 +46,8 @@ class ObjectTokens:
         for k in views[pixels[views] > 0]:
             features = np.asarray(self._features(int(k)))
             channels = features.shape[-1]
-            owners = patch_owners(self._mask(int(k)), features.shape[:2])
+            owners = patch_owners(
+                patch_shares(self._mask(int(k)), features.shape[:2]), features.shape[0] * features.shape[1]
+            )
             tokens.append(features.reshape(-1, channels)[owners == instance])
         return np.concatenate(tokens) if tokens else np.zeros((0, channels), np.float16)

@@ -67,9 +67,11 @@ def decide(
         similarity[1].merge(comparison.similarity1[submap])
         is_met = current.geometry.first_keyframe <= last_keyframe[submap]
         dissimilarity = [change_of_similarity(s.mean, extractor.similarity) for s in similarity]
-        evidence0, scale0 = _visit_evidence(previous, seen_so_far, None, dissimilarity[0], settings)
+        evidence0, scale0 = _visit_evidence(
+            previous, seen_so_far, ~observation.is_noise0, dissimilarity[0], settings
+        )
         evidence1, scale1 = _visit_evidence(
-            current, observation.of_current, is_met, dissimilarity[1], settings
+            current, observation.of_current, is_met & ~observation.is_noise1, dissimilarity[1], settings
         )
         if settings.change.rule == "paper":
             decision = decide_by_association(
@@ -109,13 +111,11 @@ def _nearest(own: VisitImages, other: VisitImages) -> NDArray[np.int32]:
 def _visit_evidence(
     visit: VisitImages,
     seen: Observation,
-    is_met: NDArray[np.bool_] | None,
+    is_met: NDArray[np.bool_],
     dissimilarity: NDArray[np.float64],
     settings: Settings,
 ) -> tuple[VisitEvidence, float]:
     surface = visit.geometry.surface
-    if is_met is None:
-        is_met = np.ones(len(surface.points_world), bool)
     through = seen.is_seen_through(settings.observation)
     appearance = appearance_residual(
         visit.geometry.log_colours,

@@ -84,7 +84,7 @@ def object_evidence(
     Args:
         instance_of_voxel: (M,) instance of each voxel, 0 = background.
         count: K.
-        is_met: (M,) the voxel has been mapped already (all of them for a finished visit).
+        is_met: (M,) the voxel has been mapped already (all of them for a finished visit) and is no noise.
         is_observed, is_seen_through: (M,) by the other visit.
         appearance: colour residual against the other visit.
         own_log_colours, normals_world, points_world: (M, 3) of the surface.

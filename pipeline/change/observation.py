@@ -185,6 +185,11 @@ class Observation:
         """(M, 3) the other visit's mean log RGB; zeros where ``has_colour`` is false."""
         return self._colour_sum / np.maximum(self._colour_count, 1).astype(np.float32)[:, None]
 
+    def is_contradicted(self, settings: ObservationSettings) -> NDArray[np.bool_]:
+        """(M,) for an observation by the voxels' own visit: whether too many of its views deny them."""
+        free, hit = self.free_count.astype(np.int32), self.hit_count.astype(np.int32)
+        return free > settings.own_free_ratio * (free + hit)
+
     def is_seen_through(self, settings: ObservationSettings) -> NDArray[np.bool_]:
         """(M,) whether the voxel is empty in the other visit: mostly free, and not by one stray pixel."""
         free, hit = self.free_count.astype(np.int32), self.hit_count.astype(np.int32)

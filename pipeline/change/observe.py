@@ -20,12 +20,16 @@ class MutualObservation:
     Attributes:
         of_current: the current surface, seen by the whole previous visit.
         of_previous: the previous surface, seen by the whole current visit.
+        is_noise0, is_noise1: voxels of the previous, current surface that their own visit sees through:
+            flying pixels and the rims of depth edges, which would look vacated in any other visit.
         by_submap: (submaps of the current visit) what each submap alone saw of the previous surface, as
             sparse arrays: they are replayed to say what was believed when.
     """
 
     of_current: Observation
     of_previous: Observation
+    is_noise0: NDArray[np.bool_]
+    is_noise1: NDArray[np.bool_]
     by_submap: tuple[dict[str, NDArray[np.generic]], ...]
 
 
@@ -35,13 +39,20 @@ def observe(
     settings: Settings,
     on_keyframe: Callable[[int], None],
 ) -> MutualObservation:
-    """Let every keyframe of either visit look at the surface of the other."""
+    """Let every keyframe of either visit look at both surfaces."""
     done = 0
-    of_current = Observation(len(current.surface.points_world))
-    for seen in glimpses(current, previous, settings.observation, settings.image.max_depth_m):
-        of_current.add(seen)
-        done += 1
-        on_keyframe(done)
+
+    def look(observed: SessionGeometry, observer: SessionGeometry) -> Observation:
+        nonlocal done
+        observation = Observation(len(observed.surface.points_world))
+        for seen in glimpses(observed, observer, settings.observation, settings.image.max_depth_m):
+            observation.add(seen)
+            done += 1
+            on_keyframe(done)
+        return observation
+
+    is_noise = [look(visit, visit).is_contradicted(settings.observation) for visit in (previous, current)]
+    of_current = look(current, previous)
     voxel_count = len(previous.surface.points_world)
     of_previous, submap_view = Observation(voxel_count), Observation(voxel_count)
     by_submap: list[dict[str, NDArray[np.generic]]] = []
@@ -56,4 +67,4 @@ def observe(
             of_previous.add_sparse(sparse)
             by_submap.append(sparse)
             submap_view = Observation(voxel_count)
-    return MutualObservation(of_current, of_previous, tuple(by_submap))
+    return MutualObservation(of_current, of_previous, is_noise[0], is_noise[1], tuple(by_submap))

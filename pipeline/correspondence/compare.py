@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.association.aggregation import MatchEvidence, patch_owners
+from pipeline.association.aggregation import MatchEvidence, PatchShares, patch_owners, patch_shares
 from pipeline.correspondence.covisibility import CovisibilityIndex, PatchView, patch_view, patch_warp
 from pipeline.correspondence.heatmaps import geometric_heatmap, semantic_heatmap
 from pipeline.correspondence.matching import best_nearby, match
@@ -127,7 +127,7 @@ def compare(
     radius = settings.correspondence.search_radius_patches
     pairs = covisibility.pairs()
     best = (_BestSimilarity(covisibility.views0), _BestSimilarity(covisibility.views1))
-    owners = (_PatchOwners(previous), _PatchOwners(current))
+    shown = (_ShownObjects(previous), _ShownObjects(current))
     counts = (previous.objects.count, current.objects.count)
     submaps = range(current.geometry.submap_count)
     evidence = [MatchEvidence.empty(*counts) for _ in submaps]
@@ -144,12 +144,13 @@ def compare(
         write_links(k0, k1, matches.links(shape0, shape1))
         p, q, score = matches.correspondences()
         submap = current.geometry.keyframes[k1].submap
-        evidence[submap].add(owners[0](k0)[p], owners[1](k1)[q], score)
+        (shares0, owners0), (shares1, owners1) = shown[0](k0), shown[1](k1)
+        evidence[submap].add(owners0[p], owners1[q], score)
         nearby0 = best_nearby(matches.correlation, patch_warp(view0, view1), shape1, radius)
         nearby1 = best_nearby(matches.correlation.T, into_previous, shape0, radius)
-        for visit, (k, nearby) in enumerate(((k0, nearby0), (k1, nearby1))):
+        for visit, (k, nearby, shares) in enumerate(((k0, nearby0, shares0), (k1, nearby1, shares1))):
             best[visit].add(k, nearby)
-            similarity[visit][submap].add(owners[visit](k), nearby.reshape(-1))
+            similarity[visit][submap].add(shares, nearby.reshape(-1))
         lights.append(light)
         on_step(step + 1, steps)
     done = len(pairs)
@@ -195,19 +196,21 @@ class _BestSimilarity:
         return self._best[k]
 
 
-class _PatchOwners:
-    """Patch owners of keyframes, the recent ones remembered: pairs come sorted by current keyframe."""
+class _ShownObjects:
+    """Objects shown by the patches of keyframes; recent ones are remembered, as pairs come in order."""
 
     _REMEMBERED = 64
 
     def __init__(self, visit: VisitImages) -> None:
         self._visit = visit
-        self._owners: dict[int, NDArray[np.int32]] = {}
+        self._known: dict[int, tuple[PatchShares, NDArray[np.int32]]] = {}
 
-    def __call__(self, k: int) -> NDArray[np.int32]:
-        if k not in self._owners:
-            if len(self._owners) >= self._REMEMBERED:
-                self._owners.pop(next(iter(self._owners)))
-            grid = self._visit.features(k).shape[:2]
-            self._owners[k] = patch_owners(self._visit.objects.mask(self._visit.geometry, k), grid)
-        return self._owners[k]
+    def __call__(self, k: int) -> tuple[PatchShares, NDArray[np.int32]]:
+        """Shares of all objects in all patches, and the owner of each patch."""
+        if k not in self._known:
+            if len(self._known) >= self._REMEMBERED:
+                self._known.pop(next(iter(self._known)))
+            rows, columns = self._visit.features(k).shape[:2]
+            shares = patch_shares(self._visit.objects.mask(self._visit.geometry, k), (rows, columns))
+            self._known[k] = (shares, patch_owners(shares, rows * columns))
+        return self._known[k]

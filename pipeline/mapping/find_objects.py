@@ -8,10 +8,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.association.aggregation import patch_owners
+from pipeline.association.aggregation import patch_owners, patch_shares
 from pipeline.mapping.front_end import SessionGeometry
 from pipeline.mapping.merging import ObjectMerger
 from pipeline.mapping.objects import SessionObjects, number_instances, remove_noise
+from pipeline.mapping.projection import visible_points
+from pipeline.mapping.voxel_blocks import VoxelBlocks
 from pipeline.perception.embedded.refinement import refine_by_change
 from pipeline.perception.protocols import FeatureExtractor, MaskGenerator
 from pipeline.settings import Settings
@@ -20,6 +22,7 @@ from pipeline.settings import Settings
 def find_objects(
     geometry: SessionGeometry,
     is_seen_through: NDArray[np.bool_],
+    is_noise: NDArray[np.bool_],
     generator: MaskGenerator,
     extractor: FeatureExtractor,
     features: Callable[[int], NDArray[np.float16]],
@@ -32,6 +35,7 @@ def find_objects(
         geometry: the mapped visit.
         is_seen_through: (M,) voxels that are empty in the other visit: what came or went as one is an object
             even where masks missed it.
+        is_noise: (M,) voxels that their own visit denies; they neither make an object nor a change.
         generator: makes the masks.
         extractor, features: for the semantic similarity of masks.
         image: colour image of a keyframe, only read when the generator needs pixels.
@@ -42,14 +46,24 @@ def find_objects(
         len(surface.points_world), settings.merge, masks_are_tracks=generator.masks_are_tracks
     )
     generator.prepare(surface)
-    for k in range(len(geometry.keyframes)):
+    blocks = VoxelBlocks(surface.points_world, surface.voxel_size_m)
+    for k, keyframe in enumerate(geometry.keyframes):
         voxels = geometry.store.voxels(k)
         masks = generator.masks(partial(image, k), voxels)
-        tokens = None if generator.masks_are_tracks else mask_tokens(masks, features(k), extractor)
-        merger.add(masks, voxels, tokens)
+        if generator.masks_are_tracks:
+            merger.add(masks, voxels)
+            continue
+        camera = geometry.strided_camera(k)
+        candidates = blocks.in_view(camera, keyframe.T_world_camera, settings.image.max_depth_m)
+        projected = visible_points(surface.points_world, candidates, camera, keyframe.T_world_camera)
+        merger.add(masks, voxels, mask_tokens(masks, features(k), extractor), projected)
     objects = remove_noise(surface, merger.finish())
-    objects = refine_by_change(surface, objects, is_seen_through, settings.discovery.change_region_voxels)
-    return number_instances(geometry, objects, settings.discovery.min_voxels, settings.discovery.min_views)
+    objects = refine_by_change(
+        surface, objects, is_seen_through & ~is_noise, settings.discovery.change_region_voxels
+    )
+    return number_instances(
+        geometry, objects, ~is_noise, settings.discovery.min_voxels, settings.discovery.min_views
+    )
 
 
 def mask_tokens(
@@ -60,7 +74,7 @@ def mask_tokens(
     Only for merging masks of one visit; the tokens themselves are kept and compared one by one later.
     """
     features, _ = extractor.comparable(stored, stored, None)
-    owners = patch_owners(masks, stored.shape[:2])
+    owners = patch_owners(patch_shares(masks, stored.shape[:2]), stored.shape[0] * stored.shape[1])
     tokens: dict[int, NDArray[np.floating]] = {}
     for number in np.unique(owners[owners > 0]):
         mean = features[owners == number].mean(axis=0)

@@ -1,7 +1,7 @@
 """Merging lifted masks into objects across keyframes (paper, Sec. III-B.2, after ConceptGraphs).
 
 A mask joins an object when their voxels overlap and they look alike; where little of an object has been
-lifted yet, its voxels are projected into the image instead and compared with the mask there (2D tracking).
+lifted yet, its points are projected into the image instead and compared with the mask there (2D tracking).
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from pipeline.settings import MergeSettings
 class _Track:
     """An object under construction."""
 
-    voxel_count: int = 0
     token_sum: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
     def similarity(self, token: NDArray[np.floating]) -> float:
@@ -49,6 +48,7 @@ class ObjectMerger:
         masks: NDArray[np.int32],
         voxels: NDArray[np.int32],
         tokens: dict[int, NDArray[np.floating]] | None = None,
+        projected_voxels: NDArray[np.int32] | None = None,
     ) -> None:
         """Add the masks of one keyframe.
 
@@ -56,6 +56,8 @@ class ObjectMerger:
             masks: (h, w) mask number of each strided pixel, 0 = none.
             voxels: (h, w) surface voxel of each strided pixel, -1 = none.
             tokens: unit feature vector of each mask, by number; needed unless masks are tracks.
+            projected_voxels: (h, w) surface voxel that projects to each pixel, -1 = none, for 2D tracking;
+                None = no object is tracked in 2D.
         """
         lifted = (masks > 0) & (voxels >= 0)
         if not lifted.any():
@@ -64,8 +66,10 @@ class ObjectMerger:
         if self._masks_are_tracks:
             self._claim(of_voxels, numbers)
             return
-        # The object map's own view of this image: every pixel's owner, by its voxel.
-        projected = np.where(voxels >= 0, self._owner[np.maximum(voxels, 0)], 0)
+        projected = np.zeros_like(masks)
+        if projected_voxels is not None:
+            visible = projected_voxels >= 0
+            projected[visible] = self._owner[projected_voxels[visible]]
         for number in np.unique(numbers):
             token = None if tokens is None else tokens.get(int(number))
             mask_voxels = np.unique(of_voxels[numbers == number])
@@ -76,7 +80,6 @@ class ObjectMerger:
                 self._tracks[owner] = _Track()
             self._claim(mask_voxels, np.full(len(mask_voxels), owner, np.int32))
             track = self._tracks[owner]
-            track.voxel_count = int((self._owner == owner).sum())
             if token is not None:
                 track.token_sum = token.astype(np.float64) + (track.token_sum if len(track.token_sum) else 0)
 
@@ -88,21 +91,26 @@ class ObjectMerger:
         token: NDArray[np.floating] | None,
     ) -> int | None:
         owners = self._owner[mask_voxels]
-        candidates, shared = np.unique(owners[owners > 0], return_counts=True)
+        shared = np.bincount(owners, minlength=self._last_number + 1)
+        pixels = np.bincount(projected[mask], minlength=self._last_number + 1)
         best: tuple[float, int] | None = None
-        for candidate, count in zip(candidates.tolist(), shared.tolist(), strict=True):
-            track = self._tracks[candidate]
-            if token is not None and track.similarity(token) < self._settings.min_similarity:
+        for candidate in np.flatnonzero((shared > 0) | (pixels > 0)).tolist():
+            if candidate == 0:
                 continue
-            overlap = count / max(1, min(len(mask_voxels), track.voxel_count))
+            if (
+                token is not None
+                and self._tracks[candidate].similarity(token) < self._settings.min_similarity
+            ):
+                continue
+            size = int((self._owner == candidate).sum())
+            overlap = shared[candidate] / max(1, min(len(mask_voxels), size))
             if overlap < self._settings.min_overlap:
-                seen = projected == candidate
-                union = int((seen | mask).sum())
-                overlap = int((seen & mask).sum()) / max(1, union)
+                union = int(mask.sum()) + int((projected == candidate).sum()) - int(pixels[candidate])
+                overlap = pixels[candidate] / max(1, union)
                 if overlap < self._settings.min_image_overlap:
                     continue
             if best is None or overlap > best[0]:
-                best = (overlap, candidate)
+                best = (float(overlap), candidate)
         return None if best is None else best[1]
 
     def _claim(self, voxels: NDArray[np.int32], owners: NDArray[np.int32]) -> None:

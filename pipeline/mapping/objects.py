@@ -61,11 +61,19 @@ def remove_noise(surface: FusedSurface, objects: NDArray[np.int32]) -> NDArray[n
 
 
 def number_instances(
-    geometry: SessionGeometry, objects: NDArray[np.int32], min_voxels: int, min_views: int
+    geometry: SessionGeometry,
+    objects: NDArray[np.int32],
+    counts: NDArray[np.bool_],
+    min_voxels: int,
+    min_views: int,
 ) -> SessionObjects:
     """Keep the objects that are large enough and seen often enough, numbered 1, 2, ... without gaps.
 
     Visits of few keyframes see many things once only: there one view is enough.
+
+    Args:
+        objects: (M,) object of each voxel, 0 = none.
+        counts: (M,) voxels that count towards the size.
     """
     if len(geometry.keyframes) < _FEW_KEYFRAMES:
         min_views = 1
@@ -75,7 +83,7 @@ def number_instances(
         voxels = geometry.store.voxels(k)
         pixels[k] = np.bincount(objects[voxels[voxels >= 0]], minlength=count + 1)
     views = (pixels >= MIN_VIEW_PIXELS).sum(axis=0)
-    size = np.bincount(objects, minlength=count + 1)
+    size = np.bincount(objects, counts, count + 1)
     kept = np.flatnonzero((size >= min_voxels) & (views >= min_views))
     kept = kept[kept > 0]
     renumber = np.zeros(count + 1, np.int32)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.association.aggregation import MatchEvidence, patch_owners
+from pipeline.association.aggregation import MatchEvidence, patch_owners, patch_shares
 
 # C* of three previous and three current patches: (p, q, s).
 P, Q = np.array([0, 1, 2, 2]), np.array([0, 2, 2, 1])
@@ -76,6 +76,21 @@ def test_proportions_of_an_object_never_exceed_one(seed: int) -> None:
     assert (np.abs(evidence.s_bar) <= 1).all()
 
 
+def owners_of(mask: np.ndarray, grid: tuple[int, int]) -> list[int]:
+    return patch_owners(patch_shares(mask, grid), grid[0] * grid[1]).tolist()
+
+
+def test_patch_shares_say_how_much_of_a_patch_each_object_covers() -> None:
+    mask = np.zeros((8, 16), np.int32)
+    mask[:2, :8] = 1
+    mask[4:, :8] = 2
+    shares = patch_shares(mask, (1, 2))
+
+    assert shares.patch.tolist() == [0, 0]
+    assert shares.instance.tolist() == [1, 2]
+    assert shares.share.tolist() == [0.25, 0.5]
+
+
 def test_patch_owner_is_the_object_with_most_pixels_of_the_patch() -> None:
     # Two patches of 8x8 pixels; 24 of 64 are the least share.
     mask = np.zeros((8, 16), np.int32)
@@ -83,21 +98,21 @@ def test_patch_owner_is_the_object_with_most_pixels_of_the_patch() -> None:
     mask[:4, 8:] = 2  # 32 pixels
     mask[4:7, 8:] = 3  # 24 pixels: enough, but fewer
 
-    assert patch_owners(mask, (1, 2)).tolist() == [1, 2]
+    assert owners_of(mask, (1, 2)) == [1, 2]
 
 
 def test_patch_with_too_little_of_any_object_has_no_owner() -> None:
     mask = np.zeros((8, 8), np.int32)
     mask.reshape(-1)[:23] = 5
 
-    assert patch_owners(mask, (1, 1)).tolist() == [0]
+    assert owners_of(mask, (1, 1)) == [0]
 
 
 def test_patches_are_numbered_row_by_row() -> None:
     mask = np.repeat(np.repeat(np.arange(6).reshape(2, 3), 4, axis=0), 4, axis=1)
 
-    assert patch_owners(mask, (2, 3)).tolist() == [0, 1, 2, 3, 4, 5]
+    assert owners_of(mask, (2, 3)) == [0, 1, 2, 3, 4, 5]
 
 
 def test_patches_share_uneven_images_without_losing_a_pixel() -> None:
-    assert patch_owners(np.full((15, 20), 7), (4, 6)).tolist() == [7] * 24
+    assert owners_of(np.full((15, 20), 7), (4, 6)) == [7] * 24

@@ -140,7 +140,7 @@ def test_instances_are_large_and_seen_often_enough_and_numbered_without_gaps() -
     everything = np.arange(95)[None]
     views = [everything, everything[:, 65:]] + [np.full((1, 20), -1)] * 11 + [everything[:, :35]]
 
-    found = number_instances(_visit(views), objects, min_voxels=20, min_views=2)
+    found = number_instances(_visit(views), objects, np.ones(len(objects), bool), min_voxels=20, min_views=2)
 
     assert found.count == 2
     assert found.instance_of_voxel.tolist() == np.repeat([1, 0, 0, 2], [30, 5, 30, 30]).tolist()
@@ -148,9 +148,18 @@ def test_instances_are_large_and_seen_often_enough_and_numbered_without_gaps() -
 
 
 def test_visits_of_few_keyframes_need_one_view_only() -> None:
-    found = number_instances(_visit([np.arange(30)[None]]), np.full(30, 4), min_voxels=20, min_views=2)
+    everything = np.ones(30, bool)
+    visit = _visit([np.arange(30)[None]])
+    found = number_instances(visit, np.full(30, 4), everything, min_voxels=20, min_views=2)
 
     assert found.count == 1
+
+
+def test_noise_does_not_make_an_object_large_enough() -> None:
+    is_surface = np.arange(30) < 19
+    visit = _visit([np.arange(30)[None]])
+
+    assert number_instances(visit, np.full(30, 4), is_surface, min_voxels=20, min_views=2).count == 0
 
 
 def test_dense_map_keeps_one_point_per_cell(hall: tuple[SessionGeometry, SessionGeometry]) -> None:

@@ -54,12 +54,25 @@ def test_overlap_threshold_is_a_share_of_the_smaller_set(shared: int, expected: 
 
 
 def test_mask_joins_the_object_whose_projection_covers_it_where_3d_overlap_is_small() -> None:
-    # Seen from nearby: one voxel of five fills eight of twelve pixels (2D overlap 0.67, 3D 0.2).
-    near = [0] * 8 + [10, 11, 12, 13]
+    # One voxel of five is shared (3D overlap 0.2), but the object's points project onto eight of the mask's
+    # twelve pixels (2D overlap 0.67).
+    merger = ObjectMerger(14, SETTINGS, masks_are_tracks=False)
+    merger.add(np.array([[1] * 6]), np.array([[0, 1, 2, 3, 4, 5]]), {1: CUP})
+    mask, voxels = np.array([[1] * 12]), np.array([[0] * 8 + [10, 11, 12, 13]])
+    projected = np.array([[0, 1, 2, 3, 4, 5, 0, 1, -1, -1, -1, -1]])
+    merger.add(mask, voxels, {1: CUP}, projected)
 
-    owners = merged(14, ([1] * 6, [0, 1, 2, 3, 4, 5], {1: CUP}), ([1] * 12, near, {1: CUP}))
+    assert merger.finish()[13] == 1
 
-    assert owners[13] == 1
+
+def test_mask_beside_the_projection_of_an_object_stays_apart() -> None:
+    merger = ObjectMerger(14, SETTINGS, masks_are_tracks=False)
+    merger.add(np.array([[1] * 6]), np.array([[0, 1, 2, 3, 4, 5]]), {1: CUP})
+    mask, voxels = np.array([[1] * 12]), np.array([[0] * 8 + [10, 11, 12, 13]])
+    projected = np.array([[0, 1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1]])
+    merger.add(mask, voxels, {1: CUP}, projected)
+
+    assert merger.finish()[13] == 2
 
 
 def test_two_masks_of_one_keyframe_are_two_objects() -> None:
