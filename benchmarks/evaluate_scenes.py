@@ -69,7 +69,7 @@ def main() -> int:
 
 
 def _evaluated(pair: Path, output: Path, settings: Settings) -> tuple[Report, float]:
-    from pipeline.run import run
+    from pipeline.system import run
 
     start = time.perf_counter()
     result = run(pair / "s0", pair / "s1", settings=settings, output=output)

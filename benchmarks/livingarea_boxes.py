@@ -1,9 +1,9 @@
-"""Put-down objects of the recorded living area: how many of the boxes drawn by people hold an appeared object?
+"""Put-down objects of the recorded living area: how many boxes drawn by people hold an appeared object?
 
     python benchmarks/livingarea_boxes.py ../shared/real/livingarea --visits 2
 
-A box counts as found when an appeared object has most of its pixels of that keyframe inside the (loose) box and
-covers a part of it. Also printed: share of labelled map points that are static, which should be nearly all.
+A box counts as found when an appeared object has most of its pixels of that keyframe inside the (loose) box
+and covers a part of it. Also printed: share of labelled map points that are static, nearly all if right.
 """
 
 from __future__ import annotations

@@ -109,8 +109,9 @@ def table(rows: list[dict[str, float]]) -> str:
         lines.append("| " + " | ".join(cells) + " |")
     first = rows[0]
     lines += [
-        f"{row['keyframes'] / first['keyframes']:.1f}x the keyframes: {row['seconds'] / first['seconds']:.2f}x the "
-        f"time, {row['peak_mb'] / first['peak_mb']:.2f}x the memory"
+        f"{row['keyframes'] / first['keyframes']:.1f}x the keyframes: "
+        f"{row['seconds'] / first['seconds']:.2f}x the time, "
+        f"{row['peak_mb'] / first['peak_mb']:.2f}x the memory"
         for row in rows[1:]
     ]
     return "\n".join(lines)

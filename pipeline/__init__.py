@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from pipeline.run import run
     from pipeline.store import open_result
+    from pipeline.system import run
 
 __all__ = ["__version__", "open_result", "run"]
 
@@ -20,7 +20,7 @@ __all__ = ["__version__", "open_result", "run"]
 def __getattr__(name: str) -> Any:
     # Loaded when asked for: the command answers --help without importing torch and Open3D.
     if name == "run":
-        from pipeline.run import run
+        from pipeline.system import run
 
         return run
     if name == "open_result":

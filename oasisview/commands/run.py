@@ -72,7 +72,7 @@ def _process(arguments: argparse.Namespace, settings: Settings, report: Report) 
     output: Path = arguments.output
     if not arguments.overwrite:
         _refuse_foreign_result(output, (previous, current), settings)
-    from pipeline.run import run
+    from pipeline.system import run
 
     before = _manifest_inode(output)
     result = run(previous, current, settings=settings, output=output, report=report)

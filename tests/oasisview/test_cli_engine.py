@@ -51,9 +51,9 @@ class Engine:
 
 @pytest.fixture
 def engine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Engine:
-    stand_in, module = Engine(), ModuleType("pipeline.run")
+    stand_in, module = Engine(), ModuleType("pipeline.system")
     module.run = stand_in.run  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "pipeline.run", module)
+    monkeypatch.setitem(sys.modules, "pipeline.system", module)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("OASISVIEW_CACHE", str(tmp_path / "cache"))
     for name in ("s0", "s1", "s2"):

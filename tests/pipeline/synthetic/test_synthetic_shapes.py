@@ -80,9 +80,9 @@ def test_the_atlas_interpolates_and_wraps():
     uv = np.array(
         [[2.5 / 4, 1.5 / 4], [2.5 / 4 + 3, 1.5 / 4 - 2], [3.0 / 4, 1.5 / 4], [0.1, 0.9]], dtype=np.float32
     )
-    colour = atlas.sample(np.full(4, tile), uv, np.full(4, 0.01, np.float32))
+    colour = atlas.sampler().sample(np.full(4, tile), uv.T, np.full(4, 0.01, np.float32)).T
     np.testing.assert_allclose(colour[:, 0], [1, 1, 0.25, 0], atol=1e-5)
-    coarse = atlas.sample(np.full(1, tile), uv[:1], np.full(1, 1.0, np.float32))
+    coarse = atlas.sampler().sample(np.full(1, tile), uv[:1].T, np.full(1, 1.0, np.float32)).T
     np.testing.assert_allclose(coarse[0, 0], (255 / 16 / 255) ** 2, atol=1e-3)
 
 

@@ -148,9 +148,10 @@ def test_lookalikes_differ_in_print_but_hardly_in_size():
     sizes = [np.diff(prop.mesh.bounds, axis=0)[0] for prop in (first, second)]
     np.testing.assert_allclose(sizes[1], sizes[0], rtol=0.11)
     tiles = [int(prop.mesh.tile[0]) for prop in (first, second)]
-    grid = np.stack(np.meshgrid(np.linspace(0, 1, 40), np.linspace(0, 1, 40)), -1).reshape(-1, 2)
+    textures = shop.atlas.sampler()
+    grid = np.stack(np.meshgrid(np.linspace(0, 1, 40), np.linspace(0, 1, 40))).reshape(2, -1)
     faces = [
-        shop.atlas.sample(np.full(1600, tile), grid.astype(np.float32), np.full(1600, 0.01, np.float32))
+        textures.sample(np.full(1600, tile), grid.astype(np.float32), np.full(1600, 0.01, np.float32))
         for tile in tiles
     ]
     assert np.abs(faces[0] - faces[1]).mean() > 0.02

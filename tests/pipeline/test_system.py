@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from fixture_scene import CAMERA, OBJECTS, camera_pose, render
 
-import pipeline.run as run_module
+import pipeline.system as run_module
 from pipeline.change.decision import NOT_MET
 from pipeline.errors import SceneMismatchError
 from pipeline.progress import ProgressEvent, Warned
 from pipeline.result import ChangeLabel, Result
-from pipeline.run import run
 from pipeline.settings import Settings
 from pipeline.synthetic.archive import ArchiveWriter
+from pipeline.system import run
 
 REAL = Path(__file__).resolve().parents[3] / "shared" / "real"
 SETTINGS = Settings().override("keyframes.submap_size", 2)

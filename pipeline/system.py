@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -11,7 +10,6 @@ from contextlib import contextmanager
 from functools import partial
 from hashlib import blake2b
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -359,12 +357,3 @@ def _keyframe_records(
         )
         for k, keyframe in enumerate(geometry.keyframes)
     ]
-
-
-class _CallableModule(ModuleType):
-    """Importing ``pipeline.run`` puts this module where ``pipeline.run(...)`` looks for the function."""
-
-    __call__ = staticmethod(run)
-
-
-sys.modules[__name__].__class__ = _CallableModule
