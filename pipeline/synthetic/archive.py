@@ -18,17 +18,18 @@ _MILLIMETRES = 1000
 
 
 class ArchiveWriter:
-    """Writes keyframes as they are rendered; :meth:`close` writes the index."""
+    """Writes keyframes in any order, from any thread; :meth:`close` writes the index."""
 
     def __init__(self, folder: Path, camera: PinholeCamera, name: str, captured_at: str) -> None:
         self._folder, self._camera = folder, camera
         self._session = {"name": name, "captured_at": captured_at, "depth_source": "sensor"}
-        self._frames: list[dict[str, Any]] = []
+        self._frames: dict[int, dict[str, Any]] = {}
         (folder / "images").mkdir(parents=True)
         (folder / "depth").mkdir()
 
     def add(
         self,
+        index: int,
         rgb: NDArray[np.uint8],
         depth: NDArray[np.float32],
         T_world_camera: NDArray[np.float64],
@@ -37,24 +38,23 @@ class ArchiveWriter:
         """Add a keyframe.
 
         Args:
+            index: its number in the visit.
             rgb: (H, W, 3) uint8.
             depth: (H, W) metres, 0 = no measurement; below 65.5 m.
             T_world_camera: (4, 4), OpenCV camera.
             timestamp_s: since the start of the visit.
         """
-        number = f"{len(self._frames):05d}"
+        number = f"{index:05d}"
         image, depth_image = f"images/{number}.jpg", f"depth/{number}.png"
         millimetres = np.clip(np.rint(depth * _MILLIMETRES), 0, 65535).astype(np.uint16)
         self._encode(image, cv2.cvtColor(rgb, cv2.COLOR_RGB2BGR), _JPEG)
         self._encode(depth_image, millimetres, _PNG)
-        self._frames.append(
-            {
-                "file_path": image,
-                "depth_file_path": depth_image,
-                "transform_matrix": np.round(T_world_camera @ T_OPENGL_OPENCV, 8).tolist(),
-                "timestamp": round(timestamp_s, 3),
-            }
-        )
+        self._frames[index] = {
+            "file_path": image,
+            "depth_file_path": depth_image,
+            "transform_matrix": np.round(T_world_camera @ T_OPENGL_OPENCV, 8).tolist(),
+            "timestamp": round(timestamp_s, 3),
+        }
 
     def close(self) -> None:
         """Write ``transforms.json``."""
@@ -69,7 +69,7 @@ class ArchiveWriter:
             "h": camera.height,
             "depth_unit_scale_factor": 1 / _MILLIMETRES,
             "session": self._session,
-            "frames": self._frames,
+            "frames": [self._frames[index] for index in sorted(self._frames)],
         }
         (self._folder / "transforms.json").write_text(json.dumps(index, indent=1) + "\n")
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +12,10 @@ _LEVELS = 11  # tiles of up to 1024 texels
 
 
 class TextureAtlas:
-    """Square, wrapping RGB tiles; sampling picks the mip level whose texels are as large as a pixel."""
+    """Square, wrapping RGB tiles; sampling picks the mip level whose texels are as large as a pixel.
+
+    Tiles are added while a scene is drawn; :meth:`sampler` then makes what its pictures are drawn with.
+    """
 
     def __init__(self) -> None:
         self._texels: list[NDArray[np.uint8]] = []
@@ -19,7 +24,7 @@ class TextureAtlas:
         self._sizes: list[int] = []
         self._gloss: list[float] = []
         self._macro: list[float] = []
-        self._pool = np.zeros((0, 3), dtype=np.uint8)
+        self._sampler: TextureSampler | None = None
 
     def add(self, image: NDArray[np.uint8], gloss: float = 0.0, macro: float = 0.0) -> int:
         """Add a tile and return its number.
@@ -59,6 +64,35 @@ class TextureAtlas:
         """(tiles,) contrast of wide stains of each tile."""
         return np.array(self._macro, dtype=np.float32)
 
+    def sampler(self) -> TextureSampler:
+        """What samples the tiles added so far; made once."""
+        if self._sampler is not None and len(self._sampler.texels) == self._length:
+            return self._sampler
+        texels = np.concatenate(self._texels)
+        packed = np.zeros((len(texels), 4), dtype=np.uint8)
+        packed[:, :3] = texels
+        self._sampler = TextureSampler(
+            packed.view(np.uint32)[:, 0],
+            np.array(self._offsets, dtype=np.int32).reshape(-1),
+            np.array(self._sizes, dtype=np.float32),
+        )
+        return self._sampler
+
+
+@dataclass(frozen=True)
+class TextureSampler:
+    """The tiles of an atlas in tables of one number per texel or tile: one gather each.
+
+    Attributes:
+        texels: (texels,) red, green, blue and an unused byte of every mip level of every tile.
+        offsets: (tiles * levels,) where a tile's mip level begins in ``texels``.
+        sizes: (tiles,) edge of the finest level, texels.
+    """
+
+    texels: NDArray[np.uint32]
+    offsets: NDArray[np.int32]
+    sizes: NDArray[np.float32]
+
     def sample(
         self, tile: NDArray[np.integer], uv: NDArray[np.float32], footprint: NDArray[np.float32]
     ) -> NDArray[np.float32]:
@@ -66,28 +100,44 @@ class TextureAtlas:
 
         Args:
             tile: (N,) tile numbers.
-            uv: (N, 2) texture coordinates, 1 = one tile.
+            uv: (2, N) texture coordinates, 1 = one tile.
             footprint: (N,) size of a pixel on the surface, in tiles.
 
         Returns:
-            (N, 3) linear RGB in [0, 1].
+            (3, N) linear RGB in [0, 1].
         """
-        if len(self._pool) != self._length:
-            self._pool = np.concatenate(self._texels)
-        size = np.array(self._sizes, dtype=np.float32)[tile]
+        size = self.sizes.take(tile)
         level = np.rint(np.log2(np.maximum(footprint * size, 1.0))).astype(np.int32)
-        level = np.minimum(level, np.log2(size).astype(np.int32))
+        np.minimum(level, np.log2(self.sizes).astype(np.int32).take(tile), out=level)
         edge = size.astype(np.int32) >> level
-        base = np.array(self._offsets, dtype=np.int32)[tile, level]
-        position = uv * edge[:, None].astype(np.float32) - 0.5
+        base = self.offsets.take(tile * np.int32(_LEVELS) + level)
+        position = uv * edge.astype(np.float32)
+        position -= np.float32(0.5)
         corner = np.floor(position)
-        weight = (position - corner).astype(np.float32)
-        low = corner.astype(np.int32) & (edge - 1)[:, None]
-        high = (low + 1) & (edge - 1)[:, None]
-        row_low, row_high = base + low[:, 1] * edge, base + high[:, 1] * edge
-        wu, wv = weight[:, :1], weight[:, 1:]
-        take = self._pool.take
-        upper = take(row_low + low[:, 0], axis=0) * (1 - wu) + take(row_low + high[:, 0], axis=0) * wu
-        lower = take(row_high + low[:, 0], axis=0) * (1 - wu) + take(row_high + high[:, 0], axis=0) * wu
-        colour = (upper * (1 - wv) + lower * wv) * np.float32(1 / 255)
-        return colour * colour  # gamma 2: close to sRGB's and cheap to undo
+        position -= corner
+        (wu, wv), inverse = position, 1 - position
+        low = corner.astype(np.int32)
+        wrap = edge - 1
+        low &= wrap
+        high = low + 1
+        high &= wrap
+        row_low, row_high = low[1] * edge, high[1] * edge
+        row_low += base
+        row_high += base
+        upper = self._channels(row_low + low[0]) * inverse[0]
+        upper += self._channels(row_low + high[0]) * wu
+        lower = self._channels(row_high + low[0]) * inverse[0]
+        lower += self._channels(row_high + high[0]) * wu
+        upper *= inverse[1]
+        lower *= wv
+        upper += lower
+        upper *= np.float32(1 / 255)
+        upper *= upper  # gamma 2: close to sRGB's and cheap to undo
+        return upper
+
+    def _channels(self, at: NDArray[np.int32]) -> NDArray[np.float32]:
+        """(3, N) red, green and blue in [0, 255] of texels."""
+        packed = self.texels.take(at).view(np.uint8).reshape(-1, 4)
+        colours = np.empty((3, len(packed)), dtype=np.float32)
+        colours[...] = packed.T[:3]
+        return colours

@@ -6,9 +6,12 @@ import importlib
 import json
 import os
 import shutil
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +33,7 @@ SCENES = ("office", "carpark", "warehouse", "market")
 _FIRST_DAY = datetime(2026, 1, 5, 8, 0, tzinfo=UTC)
 _TRUTH_STRIDE = 2  # every second pixel is enough for points 2 cm apart
 _STAGE = "generate"
+T = TypeVar("T")
 
 
 def generate(
@@ -41,6 +45,7 @@ def generate(
     *,
     size: tuple[int, int] = (640, 480),
     sensor: SensorSettings | None = None,
+    workers: int | None = None,
 ) -> None:
     """Write two visits of a synthetic scene: ``OUT/s0``, ``OUT/s1``, ``OUT/gt.ply``, ``OUT/scene.json``.
 
@@ -55,6 +60,7 @@ def generate(
         report: told of every keyframe.
         size: width and height of the images, pixels.
         sensor: noise of depth, image and poses; None = the scene's own.
+        workers: threads that make keyframes; None = one for each processor. The bytes do not depend on it.
 
     Raises:
         InputError: an unknown scene, too few frames, a folder that is not empty or cannot be made.
@@ -74,7 +80,7 @@ def generate(
     except OSError as error:
         raise InputError(f"cannot write {out}: {error.strerror or error}", "choose another place") from None
     try:
-        record(drawn, unfinished, sensor or drawn.sensor, report)
+        record(drawn, unfinished, sensor or drawn.sensor, report, workers or _processors())
         if out.exists():
             out.rmdir()
         unfinished.rename(out)
@@ -100,36 +106,52 @@ def build_scene(scene: str, seed: int, frames: int, size: tuple[int, int] = (640
 
 
 def record(
-    scene: SyntheticScene, folder: Path, sensor: SensorSettings, report: Report = silent
+    scene: SyntheticScene, folder: Path, sensor: SensorSettings, report: Report = silent, workers: int = 1
 ) -> LabelledPoints:
-    """Record both visits of a scene into an existing folder and return its ground truth."""
+    """Record both visits of a scene into an existing folder and return its ground truth.
+
+    Threads, not processes: numpy, OpenCV and Open3D run without Python's lock, and a forked child of a
+    process that has used Open3D may hang.
+    """
     rng = np.random.default_rng([SCENES.index(scene.name), scene.seed, 1])
     renderers = [Renderer(*scene.mesh_of_visit(v), scene.atlas, scene.lighting[v]) for v in (0, 1)]
     start = _FIRST_DAY + timedelta(minutes=int(rng.integers(0, 300 * 24 * 60)))
     starts = (start, start + timedelta(days=int(rng.integers(1, 40)), minutes=int(rng.integers(-200, 200))))
     frames = len(scene.paths[0])
-    seen = []
-    for visit in (0, 1):
-        captured_at = starts[visit].strftime("%Y-%m-%dT%H:%M:%SZ")
-        name = f"{scene.name} {scene.seed}, visit {visit + 1}"
-        archive = ArchiveWriter(folder / f"s{visit}", scene.camera, name, captured_at)
-        points = SeenPoints(scene.truth_voxel_m)
-        reported = misplace(scene.paths[visit], sensor, rng)
-        for index, T_world_camera in enumerate(scene.paths[visit]):
-            view = renderers[visit].view(scene.camera, T_world_camera)
-            # Noise of its own for every frame: the order in which frames are made does not matter.
-            noise = np.random.default_rng([SCENES.index(scene.name), scene.seed, 2 + visit, index])
-            rgb = expose(view, scene.lighting[visit].exposure, sensor, noise)
-            archive.add(rgb, measure(view, sensor, noise), reported[index], index * 0.5)
-            within = view.depth[::_TRUTH_STRIDE, ::_TRUTH_STRIDE]
-            valid = (within > sensor.min_range_m) & (within < sensor.max_range_m)
-            in_camera = scene.camera.strided(_TRUTH_STRIDE).backproject(np.where(valid, within, 0))[valid]
-            owner = view.object_id[::_TRUTH_STRIDE, ::_TRUTH_STRIDE][valid]
-            points.add(transform_points(T_world_camera, in_camera), owner)
-            report(ProgressEvent(_STAGE, visit * frames + index + 1, 2 * frames))
+    archives = [
+        ArchiveWriter(
+            folder / f"s{visit}",
+            scene.camera,
+            f"{scene.name} {scene.seed}, visit {visit + 1}",
+            starts[visit].strftime("%Y-%m-%dT%H:%M:%SZ"),
+        )
+        for visit in (0, 1)
+    ]
+    clouds = [SeenPoints(scene.truth_voxel_m) for _ in (0, 1)]
+    reported = [misplace(scene.paths[visit], sensor, rng) for visit in (0, 1)]
+
+    def keyframe(number: int) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        visit, index = divmod(number, frames)
+        T_world_camera = scene.paths[visit][index]
+        view = renderers[visit].view(scene.camera, T_world_camera)
+        # Noise of its own for every frame: the order in which frames are made does not matter.
+        noise = np.random.default_rng([SCENES.index(scene.name), scene.seed, 2 + visit, index])
+        rgb = expose(view, scene.lighting[visit].exposure, sensor, noise)
+        archives[visit].add(index, rgb, measure(view, sensor, noise), reported[visit][index], index * 0.5)
+        within = view.depth[::_TRUTH_STRIDE, ::_TRUTH_STRIDE]
+        valid = (within > sensor.min_range_m) & (within < sensor.max_range_m)
+        in_camera = scene.camera.strided(_TRUTH_STRIDE).backproject(np.where(valid, within, 0))[valid]
+        owner = view.object_id[::_TRUTH_STRIDE, ::_TRUTH_STRIDE][valid]
+        return clouds[visit].thinned(transform_points(T_world_camera, in_camera), owner)
+
+    for number, (points_world, owner) in enumerate(_in_order(keyframe, 2 * frames, workers)):
+        clouds[number // frames].add(points_world, owner)
+        report(ProgressEvent(_STAGE, number + 1, 2 * frames))
+    for archive in archives:
         archive.close()
-        seen.append(points.points())
-    truth = _label(scene, seen, renderers, sensor)
+    truth = _label(
+        scene, list(_in_order(lambda v: clouds[v].points(), 2, workers)), renderers, sensor, workers
+    )
     write_ply(folder / "gt.ply", truth)
     (folder / "scene.json").write_text(json.dumps(describe(scene, truth), indent=1) + "\n")
     return truth
@@ -140,6 +162,7 @@ def _label(
     seen: list[tuple[NDArray[np.float32], NDArray[np.int32]]],
     renderers: list[Renderer],
     sensor: SensorSettings,
+    workers: int,
 ) -> LabelledPoints:
     settings = TruthSettings()
     partners: dict[int, int] = {}
@@ -147,23 +170,40 @@ def _label(
         if thing.replaced_by is not None:
             partners[thing.object_id] = thing.replaced_by
             partners[thing.replaced_by] = thing.object_id
-    known = [
-        observed(
-            *seen[visit],
-            scene.camera,
-            scene.paths[1 - visit],
-            renderers[1 - visit].first_hit,
-            sensor.max_range_m,
-            partners,
-            settings,
-        )
-        for visit in (0, 1)
-    ]
+
+    def observed_of(visit: int) -> NDArray[np.bool_]:
+        other = 1 - visit
+        hit = renderers[other].first_hit
+        path, farthest = scene.paths[other], sensor.max_range_m
+        return observed(*seen[visit], scene.camera, path, hit, farthest, partners, settings)
+
+    known = list(_in_order(observed_of, 2, workers))
     owners = (seen[0][1], seen[1][1])
     static = {thing.object_id for thing in scene.objects if thing.fate == "static"}
     moved = {thing.object_id for thing in scene.objects if thing.is_moved}
     labels = label_points(owners, (known[0], known[1]), static, moved, settings)
     return assemble((seen[0][0], seen[1][0]), owners, labels)
+
+
+def _processors() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _in_order(make: Callable[[int], T], count: int, workers: int) -> Iterator[T]:
+    """``make(0), make(1), ...`` made by several threads; few results wait at a time."""
+    with ThreadPoolExecutor(workers) as pool:
+        waiting: deque[Future[T]] = deque()
+        try:
+            for index in range(count):
+                waiting.append(pool.submit(make, index))
+                if len(waiting) > workers:
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            for future in waiting:
+                future.cancel()
 
 
 def describe(scene: SyntheticScene, truth: LabelledPoints) -> dict[str, Any]:

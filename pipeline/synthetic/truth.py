@@ -49,20 +49,23 @@ class SeenPoints:
         self._owners = [np.zeros(0, dtype=np.int32)]
 
     def add(self, points_world: NDArray[np.float32], object_id: NDArray[np.int32]) -> None:
-        """Add what a keyframe saw: (N, 3) metres, exactly on the surfaces, and (N,) their objects."""
-        points, owners = self._thinned(points_world, object_id)
-        self._points.append(points)
-        self._owners.append(owners)
+        """Add what a keyframe saw: (N, 3) metres, exactly on the surfaces, and (N,) their objects.
+
+        What was thinned already need not be thinned again, but the order of the keyframes counts.
+        """
+        self._points.append(points_world)
+        self._owners.append(object_id)
 
     def points(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """All points of the visit, (N, 3) metres, and their objects, (N,), 0 = background."""
-        points, owners = self._thinned(np.concatenate(self._points), np.concatenate(self._owners))
+        points, owners = self.thinned(np.concatenate(self._points), np.concatenate(self._owners))
         self._points, self._owners = [points], [owners]
         return points, owners
 
-    def _thinned(
+    def thinned(
         self, points: NDArray[np.float32], owners: NDArray[np.int32]
     ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """The first of the points in each voxel of each object; any thread may call it."""
         cells = np.floor(points / self._voxel_m).astype(np.int64) + (1 << 15)
         key = cells[:, 0] << 48 ^ cells[:, 1] << 32 ^ cells[:, 2] << 16 ^ owners
         _, first = np.unique(key, return_index=True)

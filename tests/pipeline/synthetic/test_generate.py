@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from pipeline.camera import T_OPENGL_OPENCV, PinholeCamera, transform_points
-from pipeline.errors import InputError, OasisError
+from pipeline.errors import InputError, OasisError, StorageError
 from pipeline.ply import NOT_SCORED, read_ply
 from pipeline.progress import ProgressEvent
 from pipeline.result import ChangeLabel
@@ -134,6 +134,22 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_scene(tmp_p
     scenes = [json.loads((tmp_path / name / "scene.json").read_text()) for name in "ac"]
     assert scenes[0]["object_count"] != scenes[1]["object_count"]
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["a", "b", "c"]
+
+
+def test_the_number_of_workers_does_not_change_a_byte(tmp_path):
+    for workers in (1, 3):
+        generate("carpark", tmp_path / str(workers), 4, 4, size=(320, 240), workers=workers)
+    assert digest(tmp_path / "1") == digest(tmp_path / "3")
+
+
+def test_a_failing_keyframe_fails_the_run_and_leaves_nothing(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pipeline.synthetic.generation.ArchiveWriter.add", full)
+    with pytest.raises(StorageError, match="No space left"):
+        generate("office", tmp_path / "out", 0, 4, size=(64, 48), workers=2)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_progress_counts_every_keyframe(tmp_path):
