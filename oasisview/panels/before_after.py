@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from oasisview import wording
-from oasisview.catalogue import BeforeAfter, Catalogue, ObjectView
+from oasisview.catalogue import Catalogue
+from oasisview.object_views import BeforeAfter, ObjectView
 from oasisview.panels.markup import key, picture, sends
 from oasisview.shell import escape
 from oasisview.wording import LABEL_NAMES

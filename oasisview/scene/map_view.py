@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from oasisview.catalogue import Catalogue
 from oasisview.panels.hud import Layers
 from oasisview.scene import outlines
+from oasisview.scene.cameras import draw_cameras
 from oasisview.scene.map_points import GROUND_RGB, MapPoints, Rgb, muted, object_colours
 from oasisview.scene.marks import LabelOf, Marks
 from oasisview.scene.picking import pick_object
@@ -69,7 +70,7 @@ class MapView:
             self._cloud(f"{visit}/ceiling", points.ceiling, points.ceiling_rgb)
             self._cloud(f"{visit}/objects", points.objects, self._object_colours(visit))
             self._add_picks(visit)
-            self._add_keyframes(visit)
+            draw_cameras(self._scene, self._catalogue.session(visit), visit, self._points, self._on_keyframe)
         self._add_gone()
         self._draw_marks()
         self._apply_visibility()
@@ -269,52 +270,6 @@ class MapView:
             handle = self._scene.get_handle_by_name(f"/map/{name}")
             if handle is not None:
                 handle.visible = on
-
-    def _add_keyframes(self, visit: int) -> None:
-        session = self._catalogue.session(visit)
-        if not session.keyframes:
-            return
-        grey = (150, 156, 166) if visit == 0 else (88, 96, 108)
-        corners = np.stack(
-            [
-                outlines.frustum_corners(
-                    k.camera, self._points.local_pose(k.T_world_camera), self._points.frustum_depth_m
-                )
-                for k in session.keyframes
-            ]
-        )
-        segments = np.concatenate([c[outlines.FRUSTUM_EDGES] for c in corners])
-        self._scene.add_line_segments(
-            f"/map/keyframes/{visit}", segments, grey, thickness=1.2, thickness_units="screen"
-        )
-        if len(session.keyframes) > 1:
-            self._scene.add_line_segments(
-                f"/map/path/{visit}",
-                outlines.path_segments(corners[:, 0]),
-                grey,
-                thickness=2.5,
-                thickness_units="screen",
-            )
-        vertices, faces = outlines.box_mesh()
-        size = np.maximum(np.ptp(corners, axis=1), 0.02).astype(np.float32)
-        middle = ((corners.min(axis=1) + corners.max(axis=1)) / 2).astype(np.float32)
-        handle = self._scene.add_batched_meshes_simple(
-            f"/map/keyframes_pick/{visit}",
-            vertices,
-            faces,
-            np.tile(np.array([1.0, 0, 0, 0], np.float32), (len(middle), 1)),
-            middle,
-            batched_scales=size,
-            opacity=0.0,
-            lod="off",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
-
-        @handle.on_click
-        def _(event: viser.SceneNodePointerEvent[viser.BatchedMeshHandle]) -> None:
-            if event.instance_index is not None:
-                self._on_keyframe(visit, int(event.instance_index))
 
     def _remove(self, name: str) -> None:
         handle = self._scene.get_handle_by_name(name)
