@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -136,21 +136,34 @@ class Hello:
     Attributes:
         object_id: of ``?object=12``; None if absent or not a number.
         width_px, height_px: size of the window.
+        address: further words of the address (``keyframe``, ``map``), unchecked.
+        remembered: what the browser kept of earlier pages, unchecked.
     """
 
     object_id: int | None
     width_px: int
     height_px: int
+    address: Mapping[str, str] = field(default_factory=dict)
+    remembered: Mapping[str, Any] = field(default_factory=dict)
 
 
 def hello(value: Any) -> Hello:
     """Parse a :class:`Hello`; a deep link that makes no sense is ignored rather than refused."""
     fields = record(
-        search=lambda search: search, width=whole_number(0, 100_000), height=whole_number(0, 100_000)
+        search=lambda search: search,
+        remembered=lambda kept: kept,
+        width=whole_number(0, 100_000),
+        height=whole_number(0, 100_000),
     )(value)
+    search = fields["search"] if isinstance(fields["search"], Mapping) else {}
+    asked = search.get("object")
     wanted: int | None = None
-    if isinstance(fields["search"], Mapping):
-        asked = fields["search"].get("object")
-        if isinstance(asked, str) and asked.isascii() and asked.isdigit() and len(asked) < 10:
-            wanted = int(asked) or None
-    return Hello(object_id=wanted, width_px=fields["width"], height_px=fields["height"])
+    if isinstance(asked, str) and asked.isascii() and asked.isdigit() and len(asked) < 10:
+        wanted = int(asked) or None
+    return Hello(
+        object_id=wanted,
+        width_px=fields["width"],
+        height_px=fields["height"],
+        address={k: search[k] for k in ("keyframe", "map") if isinstance(search.get(k), str)},
+        remembered=fields["remembered"] if isinstance(fields["remembered"], Mapping) else {},
+    )

@@ -25,7 +25,7 @@ from __future__ import annotations
 import dataclasses
 import html
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import resources
 from typing import Any, Literal, TypeVar, get_args
@@ -76,8 +76,8 @@ def _stylesheet() -> str:
 
 
 @cache
-def _script() -> str:
-    return resources.files("web_assets").joinpath("shell.js").read_text("utf-8")
+def _script(name: str) -> str:
+    return resources.files("web_assets").joinpath(name).read_text("utf-8").strip()
 
 
 class Shell:
@@ -115,7 +115,7 @@ class Shell:
             "regions": get_args(Region),
             "maxText": events.MAX_TEXT_LENGTH,
         }
-        self._run(f"({_script().strip()})({json.dumps(options)})")
+        self._run(f"({_script('shell.js')})({json.dumps(options)});({_script('dialogs.js')})()")
 
     @staticmethod
     def available() -> bool:
@@ -202,6 +202,14 @@ class Shell:
         """Mark ``[data-object="ID"]`` elements as selected, scroll to the row, keep it in the address."""
         self._call("setSelection", None if object_id is None else int(object_id))
 
+    def set_address(self, **values: str | None) -> None:
+        """Keep places in the page's address, to be found again after a reload; None removes one."""
+        self._call("setAddress", values)
+
+    def remember(self, tastes: Mapping[str, Any]) -> None:
+        """Keep what a person likes in the browser; later pages send it with their ``hello``."""
+        self._call("remember", dict(tastes))
+
     def set_theme(self, dark: bool) -> None:
         """Light or dark, for the panels of viser and for everything of the shell."""
         self.client.gui.configure_theme(
@@ -211,9 +219,9 @@ class Shell:
             brand_color=ACCENT_DARK if dark else ACCENT_LIGHT,
         )
 
-    def ask_reason(self, title: str, kind: str, *, value: str = "") -> None:
-        """Open a dialog with a text field; saving sends the text as an event of ``kind``."""
-        self._call("ask", title, kind, value)
+    def ask_reason(self, title: str, hint: str) -> None:
+        """Open a dialog that sends ``reason`` (text) or, only if chosen explicitly, ``no_reason``."""
+        self._call("askReason", title, hint)
 
     def close(self) -> None:
         """Stop handling events; call when the client disconnects."""

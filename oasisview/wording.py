@@ -18,6 +18,7 @@ LABEL_WORDS: dict[ChangeLabel, str] = {
     ChangeLabel.UNKNOWN: "unknown",
 }
 LABEL_NAMES: dict[ChangeLabel, str] = {label: label.name.lower() for label in ChangeLabel}
+LABEL_OF_NAME: dict[str, ChangeLabel] = {name: label for label, name in LABEL_NAMES.items()}
 CASE_WORDS: dict[MatchCase, str] = {
     MatchCase.CONFIDENT: "case 1: sure match",
     MatchCase.PARTIAL: "case 2: seen in part",
@@ -27,6 +28,8 @@ CASE_WORDS: dict[MatchCase, str] = {
 NOTHING_SELECTED = (
     "Click an object in the map, in an image or in the queue, or press J for the most doubtful one."
 )
+NO_REASON = "(no reason given)"  # stored in the place of a reason: silence was chosen, not forgotten
+REASON_HINT = "Your reason is kept with your name and the time, and goes into the exports."
 NO_DECISIONS = "No decisions yet. Press Enter to accept a label, or 1 to 5 to set another one."
 NO_SHARED_VIEW = "No keyframe of the other visit shows this view."
 NO_OBJECTS = "No objects were found in these visits, so there is nothing to review."
@@ -60,6 +63,13 @@ class Limits:
             tau_d_m=float(change.get("tau_d_m", default.tau_d_m)),
             nu_min=float(change.get("nu_min", default.nu_min)),
         )
+
+
+def pair_case(sigma: float, s_bar: float, limits: Limits) -> MatchCase:
+    """Which of the four cases a pair of objects is (paper, Sec. III-C.2)."""
+    if s_bar >= limits.tau_s:
+        return MatchCase.CONFIDENT if sigma >= limits.tau_sigma else MatchCase.PARTIAL
+    return MatchCase.LOOKALIKE if sigma >= limits.tau_sigma else MatchCase.NONE
 
 
 def visit_word(session: int, sessions: int = 2) -> str:

@@ -62,7 +62,7 @@
   document.addEventListener("click", (event) => {
     if (!(event.target instanceof Element)) return;
     const opener = event.target.closest("[data-open]");
-    if (opener) { open(opener.getAttribute("data-open")); return; }
+    if (opener) { window.oasis.open(opener.getAttribute("data-open")); return; }
     const sender = event.target.closest("[data-send]");
     if (sender && !isField(sender)) {
       if (!sender.disabled) send(sender.getAttribute("data-send"), declaredValue(sender));
@@ -157,10 +157,15 @@
 
   /* ---- selection ---- */
 
-  const setSelection = (objectId) => {
+  const setAddress = (values) => {
     const url = new URL(location.href);
-    if (objectId === null) url.searchParams.delete("object"); else url.searchParams.set("object", objectId);
+    for (const [name, value] of Object.entries(values)) {
+      if (value === null) url.searchParams.delete(name); else url.searchParams.set(name, value);
+    }
     history.replaceState(history.state, "", url);
+  };
+  const setSelection = (objectId) => {
+    setAddress({ object: objectId });
     if (objectId === null) { selectionStyle.textContent = ""; return; }
     const selector = `[data-object="${objectId}"]`;
     // A rule, not a class: React redraws the panels and would lose a class that it does not know of.
@@ -173,6 +178,16 @@
       else if (++tries < 20) setTimeout(reveal, 100);  // the panel with the row may still be on its way
     };
     reveal();
+  };
+
+  /* ---- what this browser remembers: tastes, for every result; places are in the address ---- */
+
+  const STORED = "oasisview";
+  const remember = (tastes) => {
+    try { localStorage.setItem(STORED, JSON.stringify(tastes)); } catch (error) { /* private window */ }
+  };
+  const remembered = () => {
+    try { return JSON.parse(localStorage.getItem(STORED)); } catch (error) { return null; }
   };
 
   /* ---- camera ---- */
@@ -198,97 +213,6 @@
     if (mutable.requestRender) mutable.requestRender();
   };
 
-  /* ---- dialogs ---- */
-
-  let keys = [];
-  const shut = (shown) => { shown.close(); shown.remove(); };
-  const dialog = (id, title) => {
-    const old = document.getElementById(id);
-    if (old) old.remove();
-    const made = element(id, "dialog");
-    made.className = "oa";
-    made.setAttribute("aria-label", title);
-    made.appendChild(document.createElement("h2")).textContent = title;
-    made.addEventListener("keydown", (event) => {
-      // Otherwise keys typed here would fire viser's commands behind the dialog.
-      event.stopPropagation();
-      // Not left to the browser: until its next frame the focus would stay in the closed dialog and
-      // swallow the next key.
-      if (event.key === "Escape") { event.preventDefault(); shut(made); }
-    });
-    made.addEventListener("close", () => made.remove());
-    return made;
-  };
-  const button = (holder, text, action, primary) => {
-    const made = holder.appendChild(document.createElement("button"));
-    made.type = "button";
-    made.textContent = text;
-    if (primary) made.className = "oa-primary";
-    made.onclick = action;
-    return made;
-  };
-  const help = () => {
-    const shown = document.getElementById("oa-help");
-    if (shown) { shut(shown); return; }
-    const made = dialog("oa-help", "Keys");
-    const table = made.appendChild(document.createElement("table"));
-    for (const [key, meaning] of keys) {
-      const row = table.insertRow();
-      row.insertCell().appendChild(document.createElement("kbd")).textContent = key;
-      row.insertCell().textContent = meaning;
-    }
-    button(made.appendChild(document.createElement("footer")), "Close", () => shut(made), true);
-    made.showModal();
-  };
-  const ask = (title, kind, value) => {
-    const made = dialog("oa-ask", title);
-    const field = made.appendChild(document.createElement("textarea"));
-    field.maxLength = connection.maxText;
-    field.value = value || "";
-    field.setAttribute("aria-label", title);
-    const footer = made.appendChild(document.createElement("footer"));
-    button(footer, "Cancel", () => shut(made));
-    const save = () => { send(kind, field.value); shut(made); };
-    button(footer, "Save (Ctrl+Enter)", save, true);
-    made.addEventListener("keydown", (event) => {
-      if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) { event.preventDefault(); save(); }
-    });
-    made.showModal();
-    field.focus();
-  };
-  const open = (what) => { if (what === "help") help(); else if (what === "note") ask("Note", "note", ""); };
-
-  /* ---- keys ---- */
-
-  const isTyping = (node) => node instanceof Element &&
-    (node.matches("textarea, select, input:not([type=range]):not([type=checkbox])") || node.isContentEditable);
-  window.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat) return;
-    if (document.querySelector("dialog[open]")) {
-      if (event.key === "?" && document.getElementById("oa-help")) help();
-      return;
-    }
-    const target = event.target;
-    if (isTyping(target)) return;
-    const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
-    if (key === "Enter" || key === " ") {
-      const focused = target instanceof Element ? target.closest("[data-send], [data-open]") : null;
-      if (target instanceof Element && target.matches("button, a, summary, input, [role=tab]")) return;
-      const pressed = focused || (key === "Enter" ? document.querySelector("[data-accept]:not(:disabled)") : null);
-      if (!pressed) return;
-      pressed.click();
-    } else if (key === "x") send("swipe");
-    else if (key === "h") send("overview");
-    else if (key === "m") open("note");
-    else if (key === "?") open("help");
-    else if (key === "Escape") {
-      document.querySelectorAll(".oa details[open]").forEach((details) => { details.open = false; });
-      element("oa-toast", "div").classList.remove("oa-shown");
-      return;
-    } else return;
-    event.preventDefault();
-  }, true);
-
   /* ---- layout and connection ---- */
 
   let observed = null;
@@ -310,7 +234,6 @@
   const connect = (fresh) => {
     connection = fresh;
     style.textContent = fresh.css;
-    keys = fresh.keys.slice();
     for (const name of fresh.regions) region(name);
     const waiting = setInterval(() => {
       if (!viser() || !viser().canvas || !viser().sendMessage) return;
@@ -318,14 +241,17 @@
       if (connection !== fresh) return;
       layout();
       const search = Object.fromEntries(new URLSearchParams(location.search));
-      send("hello", { search: { object: search.object ?? null }, width: innerWidth, height: innerHeight });
+      send("hello", {
+        search: { object: search.object ?? null, keyframe: search.keyframe ?? null, map: search.map ?? null },
+        remembered: remembered(), width: innerWidth, height: innerHeight,
+      });
     }, 50);
   };
 
   window.O = send;
   window.oasis = {
-    connect, send, setHtml, swapBand, toast, setSelection, flyTo, ask, help,
-    addKey: (key, meaning) => { keys.push([key, meaning]); },
+    connect, send, element, isField, setHtml, swapBand, toast, setSelection, setAddress, remember, flyTo,
+    options: () => connection,
   };
   connect(options);
 })

@@ -100,18 +100,31 @@ def _table(catalogue: Catalogue, found: list[Candidate], session: int) -> str:
         name = wording.object_name(candidate.object_id)
         send = sends("select", candidate.object_id)
         tile = picture(catalogue.thumbnail_url(candidate.object_id, session), name)
-        pictures.append(f'<td {send} title="Show {name}">{tile}</td>')
-        numbers.append(f"<td>{candidate.object_id}</td>")
+        words = (
+            f"{name}: {_case(catalogue, candidate)}; \u03c3 {candidate.sigma:.2f}, "
+            f"quality {candidate.s_bar:.2f}. Click to select it."
+        )
+        tip = f'title="{escape(words)}"'
+        pictures.append(
+            f'<td><button class="oa-bare" {send} {tip} aria-label="{escape(words)}">{tile}</button></td>'
+        )
+        numbers.append(f'<th scope="col">{candidate.object_id}</th>')
         for row, value in ((sigma, candidate.sigma), (quality, candidate.s_bar)):
             ground, ink = share_colour(value)
             colours = f"background:{ground};color:{ink}"
-            row.append(f'<td class="oa-cell{frame}" {send} style="{colours}">{value:.2f}</td>')
+            row.append(f'<td class="oa-cell{frame}" {send} {tip} style="{colours}">{value:.2f}</td>')
     return (
         '<table class="oa-heat">'
         f"<tr><th></th>{''.join(pictures)}</tr><tr><th>#</th>{''.join(numbers)}</tr>"
         f'<tr><th title="share of matching patches">\u03c3</th>{"".join(sigma)}</tr>'
         f'<tr><th title="quality of these matches">s\u0304</th>{"".join(quality)}</tr></table>'
     )
+
+
+def _case(catalogue: Catalogue, candidate: Candidate) -> str:
+    if candidate.chosen:
+        return "chosen, the same object on the other visit"
+    return wording.CASE_WORDS[wording.pair_case(candidate.sigma, candidate.s_bar, catalogue.limits)]
 
 
 def _rival(catalogue: Catalogue, rival: Candidate, partner: Candidate | None, session: int) -> str:

@@ -8,8 +8,9 @@ from oasisview import wording
 from oasisview.catalogue import Catalogue
 from oasisview.heatmap_colours import CIVIDIS, gradient_css
 from oasisview.panels.markup import empty, picture, section, sends
+from oasisview.panels.matrix_close_up import close_up_html
 from oasisview.shell import escape
-from pipeline.result import MatchCase
+from pipeline.result import ScoreMatrix
 
 KINDS = {"sigma": "matching patches \u03c3", "s_bar": "match quality s\u0304"}
 
@@ -22,11 +23,22 @@ def cell_at(shape: tuple[int, int], u: float, v: float) -> tuple[int, int] | Non
     return min(int(v * rows), rows - 1), min(int(u * columns), columns - 1)
 
 
-def pair_case(sigma: float, s_bar: float, limits: wording.Limits) -> MatchCase:
-    """Which of the four cases a pair of objects is (paper, Sec. III-C.2)."""
-    if s_bar >= limits.tau_s:
-        return MatchCase.CONFIDENT if sigma >= limits.tau_sigma else MatchCase.PARTIAL
-    return MatchCase.LOOKALIKE if sigma >= limits.tau_sigma else MatchCase.NONE
+def cell_of(matrix: ScoreMatrix, before_id: int, after_id: int) -> tuple[int, int] | None:
+    """Row and column of a pair of objects; None if there is no such pair."""
+    rows = np.flatnonzero(matrix.row_object_ids == before_id)
+    columns = np.flatnonzero(matrix.column_object_ids == after_id)
+    return (int(rows[0]), int(columns[0])) if len(rows) and len(columns) else None
+
+
+def pair_words(catalogue: Catalogue, row: int, column: int) -> str:
+    """What the matrix says about a pair of objects, in a sentence without an end."""
+    matrix = catalogue.result.score_matrix
+    if matrix.row_object_ids[row] == matrix.column_object_ids[column]:
+        return "chosen partners: one object, seen on both visits"
+    if matrix.match_count[row, column] == 0:
+        return "no patch of one finds its match on the other"
+    sigma, s_bar = float(matrix.sigma[row, column]), float(matrix.s_bar[row, column])
+    return wording.CASE_WORDS[wording.pair_case(sigma, s_bar, catalogue.limits)]
 
 
 def matrix_html(catalogue: Catalogue, kind: str, selected: int | None, cell: tuple[int, int] | None) -> str:
@@ -41,18 +53,22 @@ def matrix_html(catalogue: Catalogue, kind: str, selected: int | None, cell: tup
         for k, name in KINDS.items()
     )
     url = escape(catalogue.matrix_url(kind))
+
+    def describe(row: int, column: int) -> str:
+        return pair_words(catalogue, row, column)
+
     return (
         '<div class="oa oa-matrix">'
         f'<div class="oa-segments" role="group" aria-label="What is shown">{switch}</div>'
         f'<div class="oa-note">Rows: {rows} objects before. Columns: {columns} objects after. '
-        "Framed: chosen partners. Click a cell to see the pair.</div>"
+        "Framed: chosen partners. Click a place to see it close up.</div>"
         f'<div class="oa-grid" style="aspect-ratio:{columns}/{rows}" '
         'data-pixel="matrix" data-session="0" data-keyframe="0">'
         f'<img src="{url}" alt="score matrix: {KINDS[kind]}" draggable="false">'
         f"{_marks(catalogue, selected, cell)}</div>"
         f'<div class="oa-colours"><span>0</span><i style="background:{gradient_css(CIVIDIS)}"></i>'
         "<span>1</span></div>"
-        f"{_pair(catalogue, cell)}</div>"
+        f"{close_up_html(catalogue, kind, selected, cell, describe)}{_pair(catalogue, cell)}</div>"
     )
 
 
@@ -80,12 +96,7 @@ def _pair(catalogue: Catalogue, cell: tuple[int, int] | None) -> str:
     row, column = cell
     before, after = int(matrix.row_object_ids[row]), int(matrix.column_object_ids[column])
     sigma, s_bar = float(matrix.sigma[row, column]), float(matrix.s_bar[row, column])
-    if before == after:
-        verdict = "Chosen partners: one object, seen on both visits."
-    elif matrix.match_count[row, column] == 0:
-        verdict = "No patch of one finds its match on the other."
-    else:
-        verdict = wording.CASE_WORDS[pair_case(sigma, s_bar, catalogue.limits)].capitalize() + "."
+    verdict = pair_words(catalogue, row, column).capitalize() + "."
     tiles = "".join(
         f'<figure role="button" tabindex="0" {sends("select", object_id)} title="Show this object">'
         f"{picture(catalogue.thumbnail_url(object_id, session), wording.object_name(object_id))}"

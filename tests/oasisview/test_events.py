@@ -65,10 +65,21 @@ def test_text_loses_what_cannot_be_read() -> None:
     assert events.text()("  two\nlines\x00\x1b[31m ") == "two\nlines[31m"
 
 
+def greeting(search: object, remembered: object = None) -> dict[str, object]:
+    return {"search": search, "remembered": remembered, "width": 1, "height": 1}
+
+
+def test_hello_keeps_words_of_the_address_and_what_was_remembered() -> None:
+    said = events.hello(greeting({"object": None, "keyframe": "2.3", "map": 7, "x": "y"}, {"dark": True}))
+    assert said.address == {"keyframe": "2.3"} and said.remembered == {"dark": True}
+    for nonsense in (None, [], "dark", 3):
+        assert events.hello(greeting([], nonsense)).remembered == {}
+
+
 def test_hello_ignores_links_that_make_no_sense() -> None:
     for asked, wanted in {"12": 12, "0": None, "-1": None, "²": None, "9" * 12: None, 3: None}.items():
-        assert events.hello({"search": {"object": asked}, "width": 1, "height": 1}).object_id == wanted
-    assert events.hello({"search": None, "width": 1, "height": 1}).object_id is None
+        assert events.hello(greeting({"object": asked})).object_id == wanted
+    assert events.hello(greeting(None)).object_id is None
 
 
 def test_escape() -> None:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from browser_harness import ViewerPage
 
+from oasisview import wording
 from oasisview.app import RunningApp, start
 from oasisview.inspector import Inspector
 from pipeline.result import ChangeLabel
@@ -237,6 +238,45 @@ def downloaded(view: ViewerPage, kind: str) -> tuple[str, bytes]:
     with view.page.expect_download() as download:
         view.page.locator(f'[data-format="{kind}"]').click()
     return download.value.suggested_filename, Path(download.value.path()).read_bytes()
+
+
+def test_a_reload_finds_selection_keyframe_map_and_tastes_again(app, opened) -> None:
+    view = opened()
+    page = view.page
+    select(view, 4)
+    page.locator('[data-part="visit"] button', has_text="Before").click()
+    wait_caption(view, "Before")
+    page.locator('[data-part="jump"]').fill("5")
+    wait_caption(view, "kf 5")
+    page.locator('[data-send="mode"]', has_text="Both").click()
+    page.locator('[data-send="theme"]').click()
+    page.locator('[data-send="filter"][aria-label^="static"]').click()
+    page.locator("summary", has_text="Layers").click()
+    page.locator('[data-key="path"]').check()
+    view.wait_for(lambda: inspector_of(app, view).choices.layers.path, "the layer")
+    page.wait_for_function("() => JSON.parse(localStorage.getItem('oasisview'))?.layers.path")
+    before = inspector_of(app, view).choices
+
+    page.reload()
+    page.wait_for_selector('[data-evidence="4"]')
+    wait_caption(view, "kf 5")
+    (again,) = [inspector for inspector in app.inspectors() if inspector.choices is not before]
+    for name in ("selected", "session", "keyframe", "mode", "dark", "shown", "layers", "colours"):
+        assert getattr(again.choices, name) == getattr(before, name), name
+    assert again.choices.dark and again.choices.mode == "both" and again.choices.session == 0
+    assert page.evaluate("() => document.documentElement.dataset.mantineColorScheme") == "dark"
+
+
+def test_an_override_without_a_reason_says_so(app, opened, small_result_path) -> None:
+    view = opened()
+    page = view.page
+    select(view, 12)
+    page.evaluate("() => { O('decide', 'static'); O('reason', ' '); }")
+    page.wait_for_function("() => document.querySelector('#oa-toast')?.innerText.includes('write a reason')")
+    assert not (small_result_path / "review.sqlite").exists()
+    page.locator("#oa-ask button", has_text="No reason").click()
+    page.wait_for_function("() => document.querySelector('#oa-toast').innerText.includes('set to static')")
+    assert [row[4] for row in journal_rows(small_result_path)] == [wording.NO_REASON]
 
 
 def test_values_from_a_browser_that_make_no_sense_change_nothing(app, opened, small_result_path) -> None:

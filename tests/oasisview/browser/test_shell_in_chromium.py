@@ -55,6 +55,7 @@ class Bench:
                 "layer": events.record(key=events.choice("boxes"), value=events.flag),
                 "note": events.text(),
                 "reason": events.text(),
+                "no_reason": events.nothing,
                 "pixel": events.pixel_click,
                 "swipe": events.nothing,
                 "overview": events.nothing,
@@ -217,12 +218,12 @@ def test_what_others_wrote_stays_text(bench: Bench, tab: ViewerPage) -> None:
     shell = shell_of(bench, tab)
     shell.set_html("who", f'<b id="name" title="{escape(hostile)}">{escape(hostile)}</b>')
     shell.toast(hostile)
-    shell.ask_reason(hostile, "reason", value=hostile)
+    shell.ask_reason(hostile, hostile)
     tab.page.wait_for_selector("#oa-ask[open]")
     shown = tab.page.evaluate(
         "() => [document.querySelector('#name').textContent, document.querySelector('#name').title,"
         " document.querySelector('#oa-toast').textContent, document.querySelector('#oa-ask h2').textContent,"
-        " document.querySelector('#oa-ask textarea').value]"
+        " document.querySelector('#oa-ask p').textContent]"
     )
     assert shown == [hostile] * 5
     tab.settle()
@@ -266,6 +267,38 @@ def test_keys_of_the_shell_and_of_viser_stay_out_of_dialogs(bench: Bench, tab: V
     tab.wait_for(lambda: 2 in bench.of_kind("pick"), "a marker")
     assert len(bench.of_kind("command")) == fired
     assert (len(bench.of_kind("swipe")), len(bench.of_kind("note"))) == (1, 1)
+
+
+def test_a_reason_is_written_or_declined_never_forgotten(bench: Bench, tab: ViewerPage) -> None:
+    shell = shell_of(bench, tab)
+    shell.ask_reason("Why?", "It is kept.")
+    tab.page.wait_for_selector("#oa-ask[open]")
+    assert tab.page.get_by_role("button", name="Save").is_disabled()
+    tab.page.keyboard.type("   ")
+    tab.page.keyboard.press("Control+Enter")
+    assert tab.page.locator("#oa-ask[open]").count() == 1, "blanks are no reason"
+    tab.page.keyboard.type("it moved")
+    tab.page.get_by_role("button", name="Save").click()
+    tab.wait_for(lambda: bench.of_kind("reason") == ["it moved"], "the reason")
+    shell.ask_reason("Why?", "It is kept.")
+    tab.page.get_by_role("button", name="No reason").click()
+    tab.wait_for(lambda: bench.of_kind("no_reason") == [None], "the refusal to say why")
+    tab.wait_js("() => !document.querySelector('dialog[open]')")
+    assert bench.of_kind("reason") == ["it moved"]
+
+
+def test_tastes_stay_in_the_browser_and_places_in_the_address(bench: Bench, tab: ViewerPage) -> None:
+    shell = shell_of(bench, tab)
+    shell.remember({"dark": True})
+    shell.set_address(keyframe="2.3", map="both")
+    tab.wait_js("() => location.search.includes('keyframe=2.3') && location.search.includes('map=both')")
+    tab.page.reload()
+    tab.wait_for(lambda: len(bench.of_kind("hello")) == 2, "the page to come back")
+    hello = bench.of_kind("hello")[1]
+    assert hello.remembered == {"dark": True}
+    assert hello.address == {"keyframe": "2.3", "map": "both"}
+    bench.shells[max(bench.shells)].set_address(map=None)
+    tab.wait_js("() => !location.search.includes('map=')")
 
 
 def test_toast_offers_undo(bench: Bench, tab: ViewerPage) -> None:

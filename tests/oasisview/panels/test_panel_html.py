@@ -19,7 +19,8 @@ from oasisview.panels.evidence import evidence_html
 from oasisview.panels.export import DOWNLOADS, export_html
 from oasisview.panels.hud import COLOURS, Layers, hud_html, legend_html, who_html
 from oasisview.panels.journal import journal_html
-from oasisview.panels.matrix import cell_at, matrix_html, pair_case
+from oasisview.panels.matrix import cell_at, cell_of, matrix_html
+from oasisview.panels.matrix_close_up import COLUMNS, ROWS, close_up
 from oasisview.panels.progress import progress_html
 from oasisview.review import Event, Kind
 from pipeline.progress import STAGES, ProgressEvent
@@ -185,11 +186,34 @@ def test_matrix_cells_and_cases(catalogue: Catalogue) -> None:
     assert cell_at((8, 9), 0.0, 0.0) == (0, 0) and cell_at((8, 9), 1.0, 1.0) == (7, 8)
     assert cell_at((8, 9), 0.5, 0.3) == (2, 4) and cell_at((0, 9), 0.5, 0.5) is None
     limits = wording.Limits(0.3, 0.85, 0.1, 0.5)
-    assert [pair_case(s, q, limits) for s, q in ((0.4, 0.9), (0.1, 0.9), (0.4, 0.5), (0.1, 0.5))] == list(
-        MatchCase
-    )
+    pairs = ((0.4, 0.9), (0.1, 0.9), (0.4, 0.5), (0.1, 0.5))
+    assert [wording.pair_case(sigma, s_bar, limits) for sigma, s_bar in pairs] == list(MatchCase)
     html = checked(matrix_html(catalogue, "sigma", 4, (0, 0)))
-    assert html.count("oa-partner") == 5 and html.count("oa-own") == 2 and 'data-pair="1-1"' in html
+    assert html.count("oa-partner") == 5 and html.count('"oa-own"') == 2 and 'data-pair="1-1"' in html
+
+
+def test_the_matrix_can_be_read_close_up(catalogue: Catalogue) -> None:
+    matrix = catalogue.result.score_matrix
+    for selected, cell in ((4, None), (12, None), (None, (6, 7)), (8, (0, 0))):
+        rows, columns = close_up(matrix, selected, cell)
+        assert 0 < len(rows) <= ROWS and 0 < len(columns) <= COLUMNS
+        assert (np.diff(rows) > 0).all() and (np.diff(columns) > 0).all()
+        if cell is not None:
+            assert cell[0] in rows and cell[1] in columns
+        else:
+            shown = [*matrix.row_object_ids[rows], *matrix.column_object_ids[columns]]
+            assert selected in shown
+    assert [len(part) for part in close_up(matrix, None, None)] == [0, 0]
+
+    row, column = cell_of(matrix, 8, 7)
+    assert (matrix.row_object_ids[row], matrix.column_object_ids[column]) == (8, 7)
+    assert cell_of(matrix, 8, 9999) is None
+    html = checked(matrix_html(catalogue, "s_bar", None, (row, column)))
+    tips = re.findall(r'<button class="oa-cell[^>]* title="([^"]*)"', html)
+    assert len(tips) == html.count('data-send="matrix_cell"') > 4
+    (own,) = [tip for tip in tips if tip.startswith("#8 before, #7 after")]
+    assert "case 3: looks alike" in own and f"{matrix.s_bar[row, column]:.2f}" in own
+    assert html.count('aria-pressed="true" title="#8 before, #7 after') == 1
 
 
 def test_hud_layers_and_legend() -> None:
