@@ -6,6 +6,8 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from oasisview import memory
 from oasisview.page import Page
 from oasisview.panels.hud import legend_html
@@ -116,11 +118,11 @@ class MapControls:
         moved = self._decisions.label_of(item.object_id) is ChangeLabel.MOVED
         before = item.sighting(0)
         other = before.centroid_world_m if moved and before is not None and before is not sighting else None
-        self.fly(
-            viewpoints.towards_object(
-                sighting.box_min_world_m, sighting.box_max_world_m, up, seen_from, other
-            )
-        )
+        low, high = np.array(sighting.box_min_world_m), np.array(sighting.box_max_world_m)
+        wanted = viewpoints.towards_object(low, high, up, seen_from, other)
+        reach = float(np.linalg.norm(high - low)) / 2 + 0.3
+        obstacles = self._bench.points.obstacles_world(sighting.session)
+        self.fly(viewpoints.clear_of(wanted, obstacles, up, reach))
 
     def _selected(self) -> MapObject | None:
         chosen = self._choices.selected

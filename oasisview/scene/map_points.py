@@ -21,6 +21,7 @@ LABEL_RGB: Mapping[bool, Mapping[ChangeLabel, Rgb]] = {
     True: {label: rgb(colour) for label, colour in palette.DARK.items()},
 }
 REPLACED_RGB: Mapping[bool, Rgb] = {False: rgb(palette.REPLACED_LIGHT), True: rgb(palette.REPLACED_DARK)}
+OBSTACLE_SAMPLE = 40_000
 GROUND_RGB: Mapping[bool, Rgb] = {False: (244, 245, 247), True: (20, 22, 26)}
 
 
@@ -67,6 +68,11 @@ class MapPoints:
         local = np.array(T_world_camera, np.float64)
         local[:3, 3] -= self.origin
         return local
+
+    def obstacles_world(self, visit: int) -> NDArray[np.float64]:
+        """A sample of what can stand before a camera in a visit, (N, 3) world, metres; no ceiling."""
+        points = np.concatenate([self.visits[visit].background, self.visits[visit].objects])
+        return points[:: max(1, len(points) // OBSTACLE_SAMPLE)].astype(np.float64) + self.origin
 
 
 def load_map_points(result: Result, max_points: int = MAX_POINTS) -> MapPoints:

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 import viser
 import viser.transforms as vtf
-from playwright.sync_api import Browser, Page, Playwright
+from playwright.sync_api import Browser, BrowserContext, Page, Playwright
 
 from oasisview.access import GuardedServer
 
@@ -121,3 +121,46 @@ class ViewerPage:
         path = ARTIFACTS / f"{name}.png"
         self.page.screenshot(path=path)
         return path
+
+
+class Tabs:
+    """Opens tabs, each a person of its own (own cookies, own storage)."""
+
+    def __init__(self, browser: Browser) -> None:
+        self._browser = browser
+        self._contexts: list[BrowserContext] = []
+
+    def open(self, url: str, size: tuple[int, int] = (1366, 768), **options: Any) -> Page:
+        width, height = size
+        context = self._browser.new_context(viewport={"width": width, "height": height}, **options)
+        self._contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(WAIT_S * 1000)
+        page.problems = []  # type: ignore[attr-defined]
+        page.on("pageerror", lambda error: page.problems.append(str(error)))  # type: ignore[attr-defined]
+        page.on(
+            "console",
+            lambda message: message.type == "error" and page.problems.append(message.text),  # type: ignore[attr-defined]
+        )
+        page.goto(url)
+        return page
+
+    def save(self, name: str) -> None:
+        """Leave behind what every tab shows."""
+        ARTIFACTS.mkdir(parents=True, exist_ok=True)
+        for number, page in enumerate(page for context in self._contexts for page in context.pages):
+            page.screenshot(path=ARTIFACTS / f"{name}_{number}.png")
+            (ARTIFACTS / f"{name}_{number}.html").write_text(page.content(), encoding="utf-8")
+            (ARTIFACTS / f"{name}_{number}.txt").write_text("\n".join(page.problems), encoding="utf-8")
+
+    def close(self) -> None:
+        for context in self._contexts:
+            context.close()
+
+
+def connected(server: GuardedServer, page: Page, before: set[int]) -> ViewerPage:
+    page.wait_for_function("() => window.__viserMutable && window.__viserMutable.canvas", timeout=60_000)
+    # Viser's notice about software rendering covers what lies under it.
+    page.add_style_tag(content="#webgl-software-rendering { display: none !important; }")
+    new = wait_for(lambda: set(server.get_clients()) - before, "the tab to connect")
+    return ViewerPage(page, server.get_clients()[new.pop()], server)

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browser_harness import ARTIFACTS, CHROMIUM, ViewerPage, launch_chromium, wait_for
+from browser_harness import CHROMIUM, Tabs, ViewerPage, connected, launch_chromium
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from oasisview.access import GuardedServer
@@ -37,38 +37,26 @@ def browser() -> Iterator[Browser]:
         chromium.close()
 
 
+@pytest.fixture(scope="module")
+def shared_tabs(browser: Browser) -> Iterator[Tabs]:
+    """Tabs that the tests of a module use one after the other: opening one costs seconds."""
+    tabs = Tabs(browser)
+    yield tabs
+    tabs.close()
+
+
 @pytest.fixture
 def chromium_page(browser: Browser, request: pytest.FixtureRequest) -> Iterator[Callable[..., Page]]:
-    """Opens tabs, each a person of its own (own cookies); leaves screenshots when the test fails."""
-    contexts = []
-
-    def open_page(url: str, size: tuple[int, int] = (1366, 768), **options: Any) -> Page:
-        width, height = size
-        context = browser.new_context(viewport={"width": width, "height": height}, **options)
-        contexts.append(context)
-        page = context.new_page()
-        page.set_default_timeout(40_000)
-        page.problems = []  # type: ignore[attr-defined]
-        page.on("pageerror", lambda error: page.problems.append(str(error)))  # type: ignore[attr-defined]
-        page.on(
-            "console",
-            lambda message: message.type == "error" and page.problems.append(message.text),  # type: ignore[attr-defined]
-        )
-        page.goto(url)
-        return page
-
-    yield open_page
+    """Opens tabs for one test; leaves pictures of all tabs behind when the test fails."""
+    tabs = Tabs(browser)
+    yield tabs.open
     called = request.node.stash.get(REPORTS, {}).get("call")
-    pages = [page for context in contexts for page in context.pages]
     if called is not None and called.failed:
-        ARTIFACTS.mkdir(parents=True, exist_ok=True)
         name = request.node.nodeid.rpartition("/")[2].translate(str.maketrans("/:[] ", "_____"))
-        for number, page in enumerate(pages):
-            page.screenshot(path=ARTIFACTS / f"{name}_{number}.png")
-            (ARTIFACTS / f"{name}_{number}.html").write_text(page.content(), encoding="utf-8")
-            (ARTIFACTS / f"{name}_{number}.txt").write_text("\n".join(page.problems), encoding="utf-8")
-    for context in contexts:
-        context.close()
+        tabs.save(name)
+        if "shared_tabs" in request.fixturenames:
+            request.getfixturevalue("shared_tabs").save(f"{name}_shared")
+    tabs.close()
 
 
 @pytest.fixture
@@ -83,14 +71,6 @@ def open_viewer(chromium_page: Callable[..., Page]) -> Callable[..., ViewerPage]
         return connected(server, page, before)
 
     return open_it
-
-
-def connected(server: GuardedServer, page: Page, before: set[int]) -> ViewerPage:
-    page.wait_for_function("() => window.__viserMutable && window.__viserMutable.canvas", timeout=60_000)
-    # Viser's notice about software rendering covers what lies under it.
-    page.add_style_tag(content="#webgl-software-rendering { display: none !important; }")
-    new = wait_for(lambda: set(server.get_clients()) - before, "the tab to connect")
-    return ViewerPage(page, server.get_clients()[new.pop()], server)
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import shutil
 import sqlite3
 import zipfile
 from collections.abc import Callable, Iterator
@@ -12,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser_harness import ViewerPage
+from browser_harness import Tabs, ViewerPage, connected
+from playwright.sync_api import Page
 
 from oasisview import wording
 from oasisview.app import RunningApp, start
@@ -37,12 +39,53 @@ def opened(app: RunningApp, open_viewer: OpenViewer) -> Callable[..., ViewerPage
 
     def open_it(size: tuple[int, int] = SMALL_WINDOW) -> ViewerPage:
         view = open_viewer(app.server, size=size)
-        view.page.wait_for_selector(".oa-row")
-        view.page.wait_for_selector("#oa-band img")
-        view.wait_node("/map/1/objects")
+        wait_for_result(view)
         return view
 
     return open_it
+
+
+def wait_for_result(view: ViewerPage) -> None:
+    view.page.wait_for_selector(".oa-row")
+    view.page.wait_for_selector("#oa-band img")
+    view.wait_node("/map/1/objects")
+
+
+@pytest.fixture(scope="module")
+def shared_app(
+    _small_result_template: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[RunningApp]:
+    running = start(
+        shutil.copytree(_small_result_template, tmp_path_factory.mktemp("shared") / "small.oasis"), port=0
+    )
+    yield running
+    running.stop()
+
+
+@pytest.fixture(scope="module")
+def _view_of_module(shared_app: RunningApp, shared_tabs: Tabs) -> ViewerPage:
+    page = shared_tabs.open(shared_app.login_url, SMALL_WINDOW)
+    view = connected(shared_app.server, page, set())
+    wait_for_result(view)
+    return view
+
+
+@pytest.fixture
+def shared_view(
+    shared_app: RunningApp, _view_of_module: ViewerPage, chromium_page: Callable[..., Page]
+) -> ViewerPage:
+    """One page for all tests that decide nothing, at the first keyframe and above the whole site."""
+    view = _view_of_module
+    view.page.get_by_role("tab", name="Evidence").click()
+    view.page.evaluate(
+        "() => { O('mode', 'after'); O('keyframe', {session: 1, keyframe: 0}); O('overview'); }"
+    )
+    wait_caption(view, "kf 1")
+    home = shared_app.workbench.points.home.position
+    view.wait_for(
+        lambda: np.allclose(view.client.camera.position, home, atol=0.02), "the camera to see the whole site"
+    )
+    return view
 
 
 def inspector_of(app: RunningApp, view: ViewerPage) -> Inspector:
@@ -77,8 +120,8 @@ def object_colour(app: RunningApp, view: ViewerPage, object_id: int) -> tuple[in
     return tuple(np.median(colours, axis=0).astype(int).tolist())
 
 
-def test_scrubbing_shows_each_keyframe_with_its_counterpart_and_heatmaps(opened) -> None:
-    view = opened()
+def test_scrubbing_shows_each_keyframe_with_its_counterpart_and_heatmaps(shared_view) -> None:
+    view = shared_view
     page = view.page
     first = page.locator('[data-part="this"] img').get_attribute("src")
     page.keyboard.press("n")
@@ -101,9 +144,9 @@ def test_scrubbing_shows_each_keyframe_with_its_counterpart_and_heatmaps(opened)
 
 
 def test_clicking_objects_in_map_image_queue_and_matrix_shows_their_evidence(
-    app, opened, small_result
+    shared_app, shared_view, small_result
 ) -> None:
-    view = opened()
+    app, view = shared_app, shared_view
     page = view.page
     wanted = small_result.object(12).sighting(1)
     view.settle(5)
@@ -279,8 +322,9 @@ def test_an_override_without_a_reason_says_so(app, opened, small_result_path) ->
     assert [row[4] for row in journal_rows(small_result_path)] == [wording.NO_REASON]
 
 
-def test_values_from_a_browser_that_make_no_sense_change_nothing(app, opened, small_result_path) -> None:
-    view = opened()
+def test_values_from_a_browser_that_make_no_sense_change_nothing(shared_app, shared_view) -> None:
+    app, view = shared_app, shared_view
+    journal = app.workbench.result.path / "review.sqlite"
     for kind, value in [
         ("select", 99999), ("select", "1; drop"), ("decide", "exploded"), ("scrub", -3), ("scrub", 10**9),
         ("keyframe", {"session": 7, "keyframe": 0}),
@@ -293,4 +337,4 @@ def test_values_from_a_browser_that_make_no_sense_change_nothing(app, opened, sm
     view.page.wait_for_selector('[data-evidence="4"]')
     choices = inspector_of(app, view).choices
     assert 0 <= choices.keyframe < 6 and choices.mode in ("before", "after", "both")
-    assert not (small_result_path / "review.sqlite").exists()
+    assert not journal.exists()

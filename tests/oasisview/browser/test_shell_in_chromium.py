@@ -1,15 +1,16 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from io import BytesIO
 from typing import Any
 
 import numpy as np
 import pytest
 import viser
-from browser_harness import ViewerPage
+from browser_harness import Tabs, ViewerPage, connected
 from PIL import Image
+from playwright.sync_api import Page
 
 from oasisview import events
 from oasisview.access import GuardedServer
@@ -61,6 +62,7 @@ class Bench:
                 "overview": events.nothing,
                 "undo": events.nothing,
                 "accept": events.nothing,
+                "marker": events.whole_number(0, 9),
             }.items():
                 shell.on_event(kind, lambda value, kind=kind: self.events.append((kind, value)), parse)
             self.shells[client.client_id] = shell
@@ -69,17 +71,54 @@ class Bench:
         return [value for known, value in self.events if known == kind]
 
 
-@pytest.fixture
-def bench(guarded_server: Callable[..., GuardedServer]) -> Bench:
+@pytest.fixture(scope="module")
+def shared_bench() -> Iterator[Bench]:
     table = AssetTable()
     for name in ("red", "blue", "green"):
         table.register(name, lambda name=name: picture(name))
-    return Bench(guarded_server(assets=table))
+    server = GuardedServer(port=0, assets=table)
+    yield Bench(server)
+    server.stop()
+
+
+@pytest.fixture(scope="module")
+def shared_tab(shared_bench: Bench, shared_tabs: Tabs) -> ViewerPage:
+    opened = connected(shared_bench.server, shared_tabs.open(shared_bench.server.url), set())
+    opened.wait_shell()
+    opened.wait_for(lambda: shared_bench.of_kind("hello"), "the page to say hello")
+    return opened
 
 
 @pytest.fixture
-def tab(bench: Bench, open_viewer: Callable[..., ViewerPage]) -> ViewerPage:
-    opened = open_viewer(bench.server)
+def bench(shared_bench: Bench) -> Bench:
+    """The server of the module, with no events yet."""
+    shared_bench.events.clear()
+    return shared_bench
+
+
+@pytest.fixture
+def tab(bench: Bench, shared_tab: ViewerPage, chromium_page: Callable[..., Page]) -> ViewerPage:
+    """The tab of the module, emptied of what an earlier test left."""
+    shell = shell_of(bench, shared_tab)
+    shared_tab.page.keyboard.press("Escape")
+    for region in ("band", "hud", "legend", "who"):
+        shell.set_html(region, "")
+    shell.set_selection(None)
+    shell.set_theme(False)
+    shared_tab.page.evaluate(
+        "() => { document.querySelectorAll('dialog').forEach(d => d.remove());"
+        " document.querySelector('#oa-toast')?.classList.remove('oa-shown'); O('marker', 0); }"
+    )
+    shared_tab.wait_for(lambda: bench.of_kind("marker"), "what is still on its way")
+    shared_tab.wait_js("() => !document.querySelector('#oa-band > *')")
+    bench.events.clear()
+    return shared_tab
+
+
+@pytest.fixture
+def own_tab(bench: Bench, open_viewer: Callable[..., ViewerPage]) -> ViewerPage:
+    """A new tab, for what would not leave the module's as it was."""
+    opened = open_viewer(bench.server, size=(1000, 700))
     opened.wait_shell()
     opened.wait_for(lambda: bench.of_kind("hello"), "the page to say hello")
     return opened
@@ -199,9 +238,8 @@ def test_selection_is_marked_and_kept_in_the_address(
     assert tab.page.evaluate(outlines) == ["none", "none"]
 
     linked = open_viewer(bench.server, query="?object=12", size=(1000, 700))
-    linked.wait_for(lambda: len(bench.of_kind("hello")) == 2, "the second page to say hello")
-    assert bench.of_kind("hello")[0].object_id is None
-    assert bench.of_kind("hello")[1] == events.Hello(object_id=12, width_px=1000, height_px=700)
+    linked.wait_for(lambda: bench.of_kind("hello"), "the linked page to say hello")
+    assert bench.of_kind("hello")[0] == events.Hello(object_id=12, width_px=1000, height_px=700)
 
 
 def test_theme_changes_the_palette(bench: Bench, tab: ViewerPage) -> None:
@@ -230,41 +268,41 @@ def test_what_others_wrote_stays_text(bench: Bench, tab: ViewerPage) -> None:
     assert not tab.page.evaluate("() => 'hacked' in window")
 
 
-def test_keys_of_the_shell_and_of_viser_stay_out_of_dialogs(bench: Bench, tab: ViewerPage) -> None:
-    shell = shell_of(bench, tab)
+def test_keys_of_the_shell_and_of_viser_stay_out_of_dialogs(bench: Bench, own_tab: ViewerPage) -> None:
+    shell = shell_of(bench, own_tab)
     shell.add_command("Label static", "1", lambda: bench.events.append(("command", 1)))
-    tab.page.keyboard.press("x")
-    tab.page.keyboard.press("h")
-    tab.wait_for(lambda: bench.of_kind("swipe") and bench.of_kind("overview"), "the keys of the shell")
+    own_tab.page.keyboard.press("x")
+    own_tab.page.keyboard.press("h")
+    own_tab.wait_for(lambda: bench.of_kind("swipe") and bench.of_kind("overview"), "the keys of the shell")
 
     def command_fired() -> bool:
-        tab.page.keyboard.press("1")
+        own_tab.page.keyboard.press("1")
         return bool(bench.of_kind("command"))
 
-    tab.wait_for(command_fired, "the command of viser")
-    tab.settle()
-    tab.page.evaluate("() => O('pick', 1)")  # whatever is still on its way comes before this
-    tab.wait_for(lambda: bench.of_kind("pick"), "a marker")
+    own_tab.wait_for(command_fired, "the command of viser")
+    own_tab.settle()
+    own_tab.page.evaluate("() => O('pick', 1)")  # whatever is still on its way comes before this
+    own_tab.wait_for(lambda: bench.of_kind("pick"), "a marker")
     fired = len(bench.of_kind("command"))
 
-    tab.page.keyboard.press("m")
-    tab.page.wait_for_selector("#oa-ask[open]")
-    tab.page.keyboard.type("check 1 box, x h m ?")
-    tab.page.keyboard.press("Control+Enter")
-    tab.wait_for(lambda: bench.of_kind("note") == ["check 1 box, x h m ?"], "the note")
-    tab.page.keyboard.press("m")
-    tab.page.keyboard.press("Escape")
-    tab.wait_js("() => !document.querySelector('dialog[open]')")
+    own_tab.page.keyboard.press("m")
+    own_tab.page.wait_for_selector("#oa-ask[open]")
+    own_tab.page.keyboard.type("check 1 box, x h m ?")
+    own_tab.page.keyboard.press("Control+Enter")
+    own_tab.wait_for(lambda: bench.of_kind("note") == ["check 1 box, x h m ?"], "the note")
+    own_tab.page.keyboard.press("m")
+    own_tab.page.keyboard.press("Escape")
+    own_tab.wait_js("() => !document.querySelector('dialog[open]')")
 
-    tab.page.keyboard.press("?")
-    tab.page.wait_for_selector("#oa-help[open]")
-    assert "Label static" in tab.page.inner_text("#oa-help")
-    tab.page.keyboard.press("1")
-    tab.page.keyboard.press("x")
-    tab.page.keyboard.press("Escape")
-    tab.wait_js("() => !document.querySelector('dialog[open]')")
-    tab.page.evaluate("() => O('pick', 2)")
-    tab.wait_for(lambda: 2 in bench.of_kind("pick"), "a marker")
+    own_tab.page.keyboard.press("?")
+    own_tab.page.wait_for_selector("#oa-help[open]")
+    assert "Label static" in own_tab.page.inner_text("#oa-help")
+    own_tab.page.keyboard.press("1")
+    own_tab.page.keyboard.press("x")
+    own_tab.page.keyboard.press("Escape")
+    own_tab.wait_js("() => !document.querySelector('dialog[open]')")
+    own_tab.page.evaluate("() => O('pick', 2)")
+    own_tab.wait_for(lambda: 2 in bench.of_kind("pick"), "a marker")
     assert len(bench.of_kind("command")) == fired
     assert (len(bench.of_kind("swipe")), len(bench.of_kind("note"))) == (1, 1)
 
@@ -287,18 +325,18 @@ def test_a_reason_is_written_or_declined_never_forgotten(bench: Bench, tab: View
     assert bench.of_kind("reason") == ["it moved"]
 
 
-def test_tastes_stay_in_the_browser_and_places_in_the_address(bench: Bench, tab: ViewerPage) -> None:
-    shell = shell_of(bench, tab)
+def test_tastes_stay_in_the_browser_and_places_in_the_address(bench: Bench, own_tab: ViewerPage) -> None:
+    shell = shell_of(bench, own_tab)
     shell.remember({"dark": True})
     shell.set_address(keyframe="2.3", map="both")
-    tab.wait_js("() => location.search.includes('keyframe=2.3') && location.search.includes('map=both')")
-    tab.page.reload()
-    tab.wait_for(lambda: len(bench.of_kind("hello")) == 2, "the page to come back")
+    own_tab.wait_js("() => location.search.includes('keyframe=2.3') && location.search.includes('map=both')")
+    own_tab.page.reload()
+    own_tab.wait_for(lambda: len(bench.of_kind("hello")) == 2, "the page to come back")
     hello = bench.of_kind("hello")[1]
     assert hello.remembered == {"dark": True}
     assert hello.address == {"keyframe": "2.3", "map": "both"}
     bench.shells[max(bench.shells)].set_address(map=None)
-    tab.wait_js("() => !location.search.includes('map=')")
+    own_tab.wait_js("() => !location.search.includes('map=')")
 
 
 def test_toast_offers_undo(bench: Bench, tab: ViewerPage) -> None:
@@ -307,24 +345,24 @@ def test_toast_offers_undo(bench: Bench, tab: ViewerPage) -> None:
     tab.wait_for(lambda: bench.of_kind("undo"), "undo")
 
 
-def test_the_camera_flies_and_a_click_still_hits(bench: Bench, tab: ViewerPage) -> None:
+def test_the_camera_flies_and_a_click_still_hits(bench: Bench, own_tab: ViewerPage) -> None:
     clicked = threading.Event()
     box = bench.server.scene.add_box("/box", dimensions=(0.5, 0.5, 0.5), position=(2.0, 1.0, 0.5))
     box.on_click(lambda _: clicked.set())
-    shell = shell_of(bench, tab)
+    shell = shell_of(bench, own_tab)
     shell.set_html("band", band(0))
-    tab.wait_node("/box")
+    own_tab.wait_node("/box")
     shell.fly_to((2.0, -2.0, 2.0), (2.0, 1.0, 0.5))
-    tab.wait_for(
+    own_tab.wait_for(
         lambda: (
-            np.allclose(tab.client.camera.position, (2.0, -2.0, 2.0), atol=0.02)
-            and np.allclose(tab.client.camera.look_at, (2.0, 1.0, 0.5), atol=0.02)
+            np.allclose(own_tab.client.camera.position, (2.0, -2.0, 2.0), atol=0.02)
+            and np.allclose(own_tab.client.camera.look_at, (2.0, 1.0, 0.5), atol=0.02)
         ),
         "the camera to arrive",
     )
-    tab.settle()
-    tab.click_world((2.0, 1.0, 0.5))
-    tab.wait_for(clicked.is_set, "the click on the box")
+    own_tab.settle()
+    own_tab.click_world((2.0, 1.0, 0.5))
+    own_tab.wait_for(clicked.is_set, "the click on the box")
     for bad in ((0, 0), (0, np.nan, 0), (2.0, 1.0, 0.5)):
         with pytest.raises(ValueError):
             shell.fly_to(bad, (2.0, 1.0, 0.5))
@@ -346,7 +384,12 @@ def test_each_tab_has_its_own_page(
     assert scripts == [], "viser would replay scripts of the server's scope to everybody who comes later"
 
 
-def test_a_reconnected_page_works_on(bench: Bench, tab: ViewerPage) -> None:
+def test_a_reconnected_page_works_on(
+    guarded_server: Callable[..., GuardedServer], open_viewer: Callable[..., ViewerPage]
+) -> None:
+    bench = Bench(guarded_server())
+    tab = open_viewer(bench.server, size=(1000, 700))
+    tab.wait_for(lambda: bench.of_kind("hello"), "the page to say hello")
     bench.server._websock_server.disconnect_all_clients()
     tab.wait_for(lambda: len(bench.of_kind("hello")) == 2, "the page to come back")
     newest = bench.shells[max(bench.shells)]
@@ -356,15 +399,17 @@ def test_a_reconnected_page_works_on(bench: Bench, tab: ViewerPage) -> None:
     tab.wait_for(lambda: bench.of_kind("pick") == [5], "an event over the new connection")
 
 
-def test_a_failing_handler_is_reported_and_the_next_event_handled(bench: Bench, tab: ViewerPage) -> None:
+def test_a_failing_handler_is_reported_and_the_next_event_handled(bench: Bench, own_tab: ViewerPage) -> None:
     def refuse(_: int) -> None:
         raise InputError("object 3 is locked", "ask ana")
 
-    shell = shell_of(bench, tab)
+    shell = shell_of(bench, own_tab)
     shell.on_event("pick", refuse, events.object_id)
-    tab.page.evaluate("() => { O('pick', 3); O('swipe'); }")
-    tab.wait_for(lambda: bench.of_kind("swipe"), "the event after the failure")
-    tab.wait_js("() => document.querySelector('#oa-toast')?.textContent === 'object 3 is locked: ask ana'")
+    own_tab.page.evaluate("() => { O('pick', 3); O('swipe'); }")
+    own_tab.wait_for(lambda: bench.of_kind("swipe"), "the event after the failure")
+    own_tab.wait_js(
+        "() => document.querySelector('#oa-toast')?.textContent === 'object 3 is locked: ask ana'"
+    )
 
 
 def test_without_scripts_the_panels_still_work(

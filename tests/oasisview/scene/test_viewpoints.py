@@ -3,7 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from oasisview.scene.viewpoints import at_keyframe, horizontal_axes, overview, towards_object
+from oasisview.scene.viewpoints import (
+    Viewpoint,
+    at_keyframe,
+    clear_of,
+    horizontal_axes,
+    overview,
+    towards_object,
+)
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -45,3 +52,29 @@ def test_a_keyframe_is_looked_through() -> None:
     view = at_keyframe(T, back_off_m=0.5)
     assert view.position == pytest.approx([-0.5, 0, 0])
     assert view.target[0] > 0 and view.target[1:] == pytest.approx([0, 0])
+
+
+def wall(x: float) -> np.ndarray:
+    """A wall 2.5 m high across the x axis, a point every 5 cm."""
+    y, z = np.meshgrid(np.arange(-4, 4, 0.05), np.arange(0, 2.5, 0.05))
+    return np.stack([np.full(y.size, x), y.ravel(), z.ravel()], axis=1)
+
+
+def test_a_clear_view_is_kept_and_a_hidden_one_goes_round_the_wall() -> None:
+    wanted = Viewpoint((4.0, 0.0, 2.0), (0.0, 0.0, 0.5))
+    assert clear_of(wanted, wall(-3.0), UP, 0.5) == wanted
+    assert clear_of(wanted, np.zeros((0, 3)), UP, 0.5) == wanted
+    found = clear_of(wanted, wall(2.0), UP, 0.5)
+    eye, target = np.array(found.position), np.array(found.target)
+    assert np.linalg.norm(eye - target) == pytest.approx(np.linalg.norm([4.0, 0.0, 1.5]))
+    share = (2.0 - target[0]) / (eye[0] - target[0]) if eye[0] > 2.0 else np.inf
+    crossing = target + share * (eye - target) if np.isfinite(share) else eye
+    assert eye[0] < 2.0 or crossing[2] > 2.5, "the line of sight passes beside or above the wall"
+    assert found.target == wanted.target and eye[2] >= 2.0 - 1e-9
+
+
+def test_a_camera_is_never_below_the_ground() -> None:
+    wanted = Viewpoint((0.0, 3.0, 1.0), (0.0, 0.0, 0.0))
+    box = np.concatenate([wall(1.5), wall(-1.5), wall(1.5)[:, [1, 0, 2]], wall(-1.5)[:, [1, 0, 2]]])
+    found = clear_of(wanted, box, UP, 0.4)
+    assert found.position[2] > 2.0, "out of a box one looks from above"
