@@ -68,11 +68,9 @@ class TextureAtlas:
         """What samples the tiles added so far; made once."""
         if self._sampler is not None and len(self._sampler.texels) == self._length:
             return self._sampler
-        texels = np.concatenate(self._texels)
-        packed = np.zeros((len(texels), 4), dtype=np.uint8)
-        packed[:, :3] = texels
+        packed = cv2.cvtColor(np.concatenate(self._texels)[None], cv2.COLOR_RGB2RGBA)[0]
         self._sampler = TextureSampler(
-            packed.view(np.uint32)[:, 0],
+            packed.reshape(-1).view(np.uint32),
             np.array(self._offsets, dtype=np.int32).reshape(-1),
             np.array(self._sizes, dtype=np.float32),
         )

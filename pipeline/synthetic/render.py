@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.camera import PinholeCamera
 from pipeline.synthetic.atlas import TextureAtlas
+from pipeline.synthetic.rigid import rotated
 from pipeline.synthetic.shapes import Mesh
 from pipeline.synthetic.textures import noise
 from pipeline.synthetic.world import Lamp, Lighting
@@ -79,11 +80,11 @@ class Renderer:
             gloss=np.zeros(pixels, dtype=np.float32),
         )
         rays_camera = camera.backproject(np.ones((height, width), dtype=np.float32)).reshape(-1, 3)
-        R_camera_world = T_world_camera[:3, :3].T.astype(np.float32)
+        directions = rotated(T_world_camera[:3, :3], rays_camera)
         centre = T_world_camera[:3, 3].astype(np.float32)
         for begin in range(0, pixels, _BAND_PIXELS):
             band = slice(begin, min(begin + _BAND_PIXELS, pixels))
-            self._draw(view, band, centre, rays_camera[band] @ R_camera_world, camera.fx)
+            self._draw(view, band, centre, directions[band], camera.fx)
         return View(
             radiance=view.radiance.reshape(height, width, 3),
             depth=view.depth.reshape(height, width),
