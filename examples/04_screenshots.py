@@ -48,11 +48,13 @@ def take(page: Page, app: RunningApp, wanted: int | None, out: Path, name: str) 
     page.goto(app.login_url)
     page.wait_for_selector(".oa-row", timeout=60_000)
     page.wait_for_selector("#oa-band img", timeout=60_000)
+    # Viser's notice about software rendering: true here, but not what the picture is about.
+    page.add_style_tag(content="#webgl-software-rendering { display: none !important; }")
     if wanted is None:
         page.locator(".oa-row").first.click()
     else:
-        page.locator(f'.oa-row[data-object="{wanted}"]').click()
-    page.wait_for_selector("[data-evidence]", timeout=30_000)
+        page.evaluate("id => window.oasis.send('select', id)", wanted)  # a static one has no row
+    page.wait_for_selector("[data-evidence]", timeout=60_000)
     page.wait_for_timeout(6_000)  # the camera flies, images decode
     page.screenshot(path=out / f"{name}_light.png")
     page.locator('[data-send="theme"]').click()

@@ -156,10 +156,20 @@ def _heatmap(
     return _figure(kind, title, note, body, bar)
 
 
+CAPTION_TIPS = {
+    "this": "The keyframe chosen above (kf); click an object in it to select it",
+    "other": "The keyframe (kf) of the other visit that sees most of the same surfaces, and how much of them",
+    "semantic": "How unlike every patch looks to its best match on the other visit: bright has changed",
+    "geometric": "Depth against the surface of the other visit, seen from here: orange is new in front, "
+    "purple is gone",
+}
+
+
 def _figure(part: str, title: str, note: str, body: str, bar: str) -> str:
+    tip = escape(CAPTION_TIPS.get(part, title))
     return (
-        f'<figure data-part="{part}"><figcaption><b>{escape(title)}</b><small>{escape(note)}</small>'
-        f"</figcaption>{body}{bar}</figure>"
+        f'<figure data-part="{part}"><figcaption title="{tip}"><b>{escape(title)}</b>'
+        f"<small>{escape(note)}</small></figcaption>{body}{bar}</figure>"
     )
 
 

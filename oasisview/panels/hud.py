@@ -84,7 +84,7 @@ def legend_html(colours: str, mode: str) -> str:
     """What the colours of the map mean."""
     if colours == "label":
         items = "".join(f"<span>{chip(label)}{LABEL_NAMES[label]}</span>" for label in LABEL_ORDER)
-        items += f"<span>{chip('replaced')}replaced pair</span>"
+        items += f"<span>{chip('replaced')}replaced pair (dashed box)</span>"
         if mode == "both":
             items += '<span class="oa-muted">diamonds: as it was before</span>'
     elif colours == "identity":

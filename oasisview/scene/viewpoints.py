@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+BOTH_PLACES_M = 3.5  # farther apart, both ends of a move make a view in which neither can be made out
 CLEARANCE_M = 0.3  # a camera this close behind a wall still has it before its eye
 CLEAR_BELOW = 0.15  # share of the view that may be hidden without looking for another side
 VIEW_HALF_WIDTH = 0.25  # tangent; the middle of the view, where the target is
@@ -77,9 +78,9 @@ def towards_object(
     radius = max(float(np.linalg.norm(high - low)) / 2, 0.25)
     if other_place is not None:
         apart = float(np.linalg.norm(np.asarray(other_place) - centre))
-        if apart < 6.0:
+        if apart < BOTH_PLACES_M:
             centre = (centre + np.asarray(other_place)) / 2
-            radius = max(radius, 0.75 * apart)
+            radius = max(radius, 0.6 * apart)
     offset = np.asarray(seen_from, np.float64) - centre
     rise = float(offset @ up)
     level = offset - rise * up
