@@ -55,7 +55,7 @@ def take(page: Page, app: RunningApp, wanted: int | None, out: Path, name: str) 
     else:
         page.evaluate("id => window.oasis.send('select', id)", wanted)  # a static one has no row
     page.wait_for_selector("[data-evidence]", timeout=60_000)
-    page.wait_for_timeout(6_000)  # the camera flies, images decode
+    page.wait_for_timeout(10_000)  # the camera flies, images and letters load
     page.screenshot(path=out / f"{name}_light.png")
     page.locator('[data-send="theme"]').click()
     page.wait_for_timeout(4_000)
