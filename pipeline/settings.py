@@ -179,12 +179,18 @@ class ChangeSettings:
         "evidence", "evidence = the place itself must have changed; paper = Eq. 8 alone"
     )
     # Weights of change_score, fitted by benchmarks/fit_change_score.py on scenes that no table reports.
-    bias: float = setting(-3.62, "log odds of a change before any evidence")
-    seen_through_weight: float = setting(12.1, "log odds for a place that was seen to be empty")
-    dissimilarity_weight: float = setting(1.01, "log odds per spread of patch dissimilarity")
-    residual_weight: float = setting(0.48, "log odds per spread of the median colour residual")
-    texture_weight: float = setting(1.26, "log odds per spread of lost texture correlation")
-    tail_weight: float = setting(1.15, "log odds per spread of the share of unexplained colours")
+    bias: float = setting(-3.48, "log odds of a change before any evidence")
+    seen_through_weight: float = setting(11.7, "log odds for a place that was seen to be empty")
+    dissimilarity_weight: float = setting(0.44, "log odds per spread of patch dissimilarity")
+    residual_weight: float = setting(1.56, "log odds per spread of the median colour residual")
+    texture_weight: float = setting(1.55, "log odds per spread of lost texture correlation")
+    tail_weight: float = setting(0.94, "log odds per spread of the share of unexplained colours")
+    full_appearance_scale: float = setting(
+        0.2, "colour spread between the visits up to which appearance counts fully", unit="log units"
+    )
+    no_appearance_scale: float = setting(
+        0.28, "colour spread from which appearance does not count", unit="log units"
+    )
     vacated_share: float = setting(0.4, "a move leaves a place, and takes one, seen to be empty this much")
     same_place_overlap: float = setting(0.1, "overlap from which two unchanged objects are one")
     moved_size_ratio: float = setting(2.0, "a moved object keeps its size within this factor")

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from pipeline import checkpoint
 from pipeline.assemble import Assembled, assemble
+from pipeline.change.change_score import appearance_trust
 from pipeline.change.decide import Conclusion, decide
 from pipeline.change.observe import MutualObservation, observe
 from pipeline.correspondence.compare import (
@@ -305,6 +306,9 @@ class _Run:
             "quality": {
                 "voxel_size_m": round(visits[0].geometry.surface.voxel_size_m, 6),
                 "appearance_scale_log": round(conclusion.appearance_scale, 4),
+                "appearance_trust": round(
+                    appearance_trust(conclusion.appearance_scale, self._settings.change), 4
+                ),
             },
             "warnings": self._warnings,
             "timings_s": self._timings_s,

@@ -21,8 +21,10 @@ _REFERENCE_SEEN_THROUGH = 0.3
 _REFERENCE_VOXELS = 30
 # As many made-up objects as this keep visits of few objects from being judged by themselves alone.
 _PRIOR_OBJECTS = 10
-# An object of this many compared voxels counts half: small ones scatter.
+# An object of this many compared voxels counts half.
 _RELIABLE_VOXELS = 150
+# Colours may speak for a change this many spreads further than patches do.
+PATCH_ALLOWANCE = 1.0
 _CLIP_LOW, _CLIP_HIGH = -3.0, 8.0
 _TAIL_FLOOR = 0.02
 _FULL_TEXTURE = 0.1
@@ -33,18 +35,47 @@ _TEXTURE_LOSS = (-1.4, 0.45, 0.2)
 _TAIL = (-3.4, 0.55, 0.3)
 
 
-def change_log_odds(evidence: ObjectEvidence, settings: ChangeSettings) -> NDArray[np.float64]:
-    """(K + 1,) log odds that an object is not at its place in the other visit; > 0 = changed."""
+def change_log_odds(
+    evidence: ObjectEvidence, appearance_scale: float, settings: ChangeSettings
+) -> NDArray[np.float64]:
+    """(K + 1,) log odds that an object is not at its place in the other visit; > 0 = changed.
+
+    Colours are compared voxel by voxel, where a pose error of a centimetre makes any printed surface look
+    changed; patches are compared within a window, which forgives it. So colours count only as far as the
+    patches look unlike as well, and not at all where the two visits' colours hardly agree anywhere: there
+    only what was seen to be empty has changed.
+
+    Args:
+        appearance_scale: spread of the colour residual between the visits, log units.
+    """
+    patches = _relative(
+        evidence, np.nan_to_num(evidence.dissimilarity), _DISSIMILARITY, np.isfinite(evidence.dissimilarity)
+    )
+    allowed = patches + PATCH_ALLOWANCE
+    residual = _relative(evidence, evidence.median_residual, _RESIDUAL)
+    texture = _relative(evidence, _texture_loss(evidence), _TEXTURE_LOSS) * _textured(evidence)
+    tail = _relative(evidence, np.log(evidence.tail_share + _TAIL_FLOOR), _TAIL)
+    # An object of few compared voxels scatters: it counts less.
+    weight = appearance_trust(appearance_scale, settings) * (
+        evidence.compared_count / (evidence.compared_count + _RELIABLE_VOXELS)
+    )
     return (
         settings.bias
         + settings.seen_through_weight * evidence.seen_through
-        + settings.dissimilarity_weight * _relative_dissimilarity(evidence)
-        + settings.residual_weight * _relative(evidence, evidence.median_residual, _RESIDUAL)
-        + settings.texture_weight
-        * _relative(evidence, _texture_loss(evidence), _TEXTURE_LOSS)
-        * _textured(evidence)
-        + settings.tail_weight * _relative(evidence, np.log(evidence.tail_share + _TAIL_FLOOR), _TAIL)
+        + weight
+        * (
+            settings.dissimilarity_weight * patches
+            + settings.residual_weight * np.minimum(allowed, residual)
+            + settings.texture_weight * np.minimum(allowed, texture)
+            + settings.tail_weight * np.minimum(allowed, tail)
+        )
     )
+
+
+def appearance_trust(appearance_scale: float, settings: ChangeSettings) -> float:
+    """How far appearance may speak, in [0, 1], by the colour residual's spread between the visits."""
+    full, none = settings.full_appearance_scale, settings.no_appearance_scale
+    return float(np.clip((none - appearance_scale) / max(none - full, 1e-9), 0.0, 1.0))
 
 
 def appearance_change(evidence: ObjectEvidence) -> NDArray[np.float64]:
@@ -64,18 +95,13 @@ def _textured(evidence: ObjectEvidence) -> NDArray[np.float64]:
     return np.clip(evidence.texture / _FULL_TEXTURE, 0, 1)
 
 
-def _relative_dissimilarity(evidence: ObjectEvidence) -> NDArray[np.float64]:
-    values = np.nan_to_num(evidence.dissimilarity)
-    return _relative(evidence, values, _DISSIMILARITY, np.isfinite(evidence.dissimilarity))
-
-
 def _relative(
     evidence: ObjectEvidence,
     values: NDArray[np.float64],
     prior: tuple[float, float, float],
     is_known: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.float64]:
-    """Values in robust spreads from the unchanged objects of these visits, less for objects of few voxels.
+    """Values in robust spreads from the unchanged objects of these visits.
 
     Args:
         prior: median and spread to start from, and the least spread.
@@ -92,6 +118,4 @@ def _relative(
         own_spread = 1.48 * float(np.median(np.abs(values[reference] - own)))
         share = count / (count + _PRIOR_OBJECTS)
         centre, spread = share * own + (1 - share) * centre, share * own_spread + (1 - share) * spread
-    scores = np.clip((values - centre) / max(spread, least), _CLIP_LOW, _CLIP_HIGH)
-    weight = evidence.compared_count / (evidence.compared_count + _RELIABLE_VOXELS)
-    return np.where(known, scores * weight, 0.0)
+    return np.where(known, np.clip((values - centre) / max(spread, least), _CLIP_LOW, _CLIP_HIGH), 0.0)

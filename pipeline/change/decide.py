@@ -135,7 +135,7 @@ def _visit_evidence(
         surface.points_world,
         dissimilarity,
     )
-    log_odds = change_log_odds(evidence, settings.change)
+    log_odds = change_log_odds(evidence, appearance.scale, settings.change)
     return VisitEvidence(evidence, log_odds, evidence.voxel_count > 0), appearance.scale
 
 
