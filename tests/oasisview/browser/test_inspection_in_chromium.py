@@ -238,7 +238,7 @@ def test_an_override_is_on_disk_recolours_every_page_and_survives_undo_and_reloa
 
 
 def test_accepting_goes_through_the_queue_in_order(app, opened, small_result_path) -> None:
-    view = opened()
+    view = opened(TINY_WINDOW)
     view.page.keyboard.press("j")
     view.page.wait_for_selector("[data-evidence]")
     first = int(view.page.locator("[data-evidence]").get_attribute("data-evidence"))
@@ -257,7 +257,7 @@ def test_accepting_goes_through_the_queue_in_order(app, opened, small_result_pat
 
 
 def test_exports_arrive_with_overrides_applied(app, opened, small_result_path, small_result) -> None:
-    view = opened()
+    view = opened(TINY_WINDOW)
     view.page.locator('.oa-row[data-object="12"]').click()
     app.workbench.decisions.decide(12, ChangeLabel.STATIC, who="ann", reason="was there", seen_event_id=None)
     view.page.get_by_role("tab", name="Export").click()
@@ -311,7 +311,7 @@ def test_a_reload_finds_selection_keyframe_map_and_tastes_again(app, opened) -> 
 
 
 def test_an_override_without_a_reason_says_so(app, opened, small_result_path) -> None:
-    view = opened()
+    view = opened(TINY_WINDOW)
     page = view.page
     select(view, 12)
     page.evaluate("() => { O('decide', 'static'); O('reason', ' '); }")

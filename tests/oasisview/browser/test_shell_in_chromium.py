@@ -159,7 +159,9 @@ def test_elements_send_without_scripts_of_their_own(bench: Bench, tab: ViewerPag
 def test_a_click_in_a_picture_gives_its_place(bench: Bench, tab: ViewerPage) -> None:
     shell_of(bench, tab).set_html("band", band(12))
     # 80 x 60 inside 200 x 100 is shown as 133.3 x 100, centred: u = 0.25 lies 33.3 + 33.3 px from the left.
-    tab.wait_js("() => [...document.querySelectorAll('#oa-band img')].every(i => i.naturalWidth)")
+    tab.wait_js(
+        "() => [...document.querySelectorAll('#oa-band img')].filter(i => i.naturalWidth).length === 2"
+    )
     box = tab.page.locator("[data-part=image1]").bounding_box()
     assert box is not None
     tab.page.mouse.click(box["x"] + 66.7, box["y"] + 75)
