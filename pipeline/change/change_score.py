@@ -48,28 +48,34 @@ def change_log_odds(
     Args:
         appearance_scale: spread of the colour residual between the visits, log units.
     """
+    seen_through, patches, residual, texture, tail = change_features(evidence).T
+    return (
+        settings.bias
+        + settings.seen_through_weight * seen_through
+        + appearance_trust(appearance_scale, settings)
+        * (
+            settings.dissimilarity_weight * patches
+            + settings.residual_weight * residual
+            + settings.texture_weight * texture
+            + settings.tail_weight * tail
+        )
+    )
+
+
+def change_features(evidence: ObjectEvidence) -> NDArray[np.float64]:
+    """(K + 1, 5) what the weights apply to: seen-through share, and in spreads from the unchanged objects:
+    patch dissimilarity, colour residual, lost texture correlation, share of unexplained colours."""
     patches = _relative(
         evidence, np.nan_to_num(evidence.dissimilarity), _DISSIMILARITY, np.isfinite(evidence.dissimilarity)
     )
-    allowed = patches + PATCH_ALLOWANCE
     residual = _relative(evidence, evidence.median_residual, _RESIDUAL)
     texture = _relative(evidence, _texture_loss(evidence), _TEXTURE_LOSS) * _textured(evidence)
     tail = _relative(evidence, np.log(evidence.tail_share + _TAIL_FLOOR), _TAIL)
+    colours = np.minimum(np.stack([residual, texture, tail], axis=1), (patches + PATCH_ALLOWANCE)[:, None])
     # An object of few compared voxels scatters: it counts less.
-    weight = appearance_trust(appearance_scale, settings) * (
-        evidence.compared_count / (evidence.compared_count + _RELIABLE_VOXELS)
-    )
-    return (
-        settings.bias
-        + settings.seen_through_weight * evidence.seen_through
-        + weight
-        * (
-            settings.dissimilarity_weight * patches
-            + settings.residual_weight * np.minimum(allowed, residual)
-            + settings.texture_weight * np.minimum(allowed, texture)
-            + settings.tail_weight * np.minimum(allowed, tail)
-        )
-    )
+    weight = evidence.compared_count / (evidence.compared_count + _RELIABLE_VOXELS)
+    appearance = np.concatenate([patches[:, None], colours], axis=1) * weight[:, None]
+    return np.concatenate([evidence.seen_through[:, None], appearance], axis=1)
 
 
 def appearance_trust(appearance_scale: float, settings: ChangeSettings) -> float:

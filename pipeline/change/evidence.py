@@ -7,6 +7,7 @@ measured on the object's voxels; a voxel counts once it was hit or seen through,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,19 @@ from pipeline.change.appearance import MIN_COMPARED_VOXELS, AppearanceResidual
 # Residuals beyond this many spreads of the pair of visits, and beyond this, belong to another surface.
 TAIL_SPREADS = 3.0
 TAIL_RESIDUAL = 0.4
+# Columns of the stored table.
+_TABLE = (
+    "voxel_count",
+    "coverage",
+    "seen_through",
+    "compared_count",
+    "median_residual",
+    "tail_share",
+    "texture",
+    "texture_correlation",
+    "dissimilarity",
+    "log_odds",
+)
 
 
 @dataclass(frozen=True)
@@ -47,22 +61,21 @@ class ObjectEvidence:
     centroid_world: NDArray[np.float64]
     dissimilarity: NDArray[np.float64]
 
+    @classmethod
+    def from_table(cls, rows: NDArray[np.void]) -> ObjectEvidence:
+        """What ``table`` gave, with a background entry put before it; centroids are not in it (NaN)."""
+        padded = np.zeros(len(rows) + 1, rows.dtype)
+        padded[1:] = rows
+        columns: dict[str, Any] = {name: padded[name].astype(float) for name in _TABLE if name != "log_odds"}
+        for name in ("voxel_count", "compared_count"):
+            columns[name] = columns[name].astype(np.int64)
+        return cls(**columns, centroid_world=np.full((len(padded), 3), np.nan))
+
     def table(self, log_odds: NDArray[np.float64]) -> NDArray[np.void]:
         """(K,) one row per instance (background left out): what thresholds and weights apply to."""
-        columns = {
-            "voxel_count": self.voxel_count,
-            "coverage": self.coverage,
-            "seen_through": self.seen_through,
-            "compared_count": self.compared_count,
-            "median_residual": self.median_residual,
-            "tail_share": self.tail_share,
-            "texture": self.texture,
-            "texture_correlation": self.texture_correlation,
-            "dissimilarity": self.dissimilarity,
-            "log_odds": log_odds,
-        }
-        rows = np.zeros(len(log_odds) - 1, [(name, np.float32) for name in columns])
-        for name, values in columns.items():
+        rows = np.zeros(len(log_odds) - 1, [(name, np.float32) for name in _TABLE])
+        for name in _TABLE:
+            values = log_odds if name == "log_odds" else getattr(self, name)
             rows[name] = values[1:]
         return rows
 

@@ -1,0 +1,105 @@
+"""What speaks for a change, and what may not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.change.change_score import appearance_trust, change_features, change_log_odds
+from pipeline.change.evidence import ObjectEvidence
+from pipeline.settings import ChangeSettings
+
+SETTINGS = ChangeSettings()
+AGREEING = 0.1  # log units: the visits' colours agree well
+OBJECTS = 21
+
+
+def unchanged() -> ObjectEvidence:
+    """Twenty objects that stayed, alike but for a little scatter; entry 0 is background."""
+    scatter = np.linspace(-1, 1, OBJECTS)
+    return ObjectEvidence(
+        voxel_count=np.full(OBJECTS, 500),
+        coverage=np.ones(OBJECTS),
+        seen_through=np.zeros(OBJECTS),
+        compared_count=np.full(OBJECTS, 400),
+        median_residual=0.15 + 0.02 * scatter,
+        tail_share=0.02 + 0.01 * scatter,
+        texture=np.full(OBJECTS, 0.3),
+        texture_correlation=0.9 + 0.03 * scatter,
+        centroid_world=np.zeros((OBJECTS, 3)),
+        dissimilarity=-2.2 + 0.1 * scatter,
+    )
+
+
+def with_object(**values: float) -> ObjectEvidence:
+    """The unchanged objects, the last of them with other values."""
+    evidence = unchanged()
+    changed = {name: getattr(evidence, name).astype(float).copy() for name in values}
+    for name, value in values.items():
+        changed[name][-1] = value
+    return replace(evidence, **changed)
+
+
+def log_odds(evidence: ObjectEvidence, scale: float = AGREEING) -> float:
+    return float(change_log_odds(evidence, scale, SETTINGS)[-1])
+
+
+def test_objects_that_look_as_before_have_not_changed() -> None:
+    assert (change_log_odds(unchanged(), AGREEING, SETTINGS)[1:] < 0).all()
+
+
+def test_a_place_seen_to_be_empty_has_changed_whatever_it_looks_like() -> None:
+    assert log_odds(with_object(seen_through=0.9)) > 0
+    assert log_odds(with_object(seen_through=0.9), scale=1.0) > 0
+
+
+def test_another_print_on_the_same_shape_is_a_change() -> None:
+    replaced = with_object(texture_correlation=0.1, tail_share=0.4, median_residual=0.5, dissimilarity=-0.5)
+
+    assert log_odds(replaced) > 0
+
+
+def test_colours_alone_do_not_make_a_change_where_patches_agree() -> None:
+    # A print that is a centimetre off: voxel colours differ, patches find their match beside it.
+    misaligned = with_object(texture_correlation=0.1, tail_share=0.4, median_residual=0.5, dissimilarity=-2.3)
+
+    assert log_odds(misaligned) < 0
+
+
+def test_appearance_does_not_count_where_the_visits_colours_hardly_agree() -> None:
+    replaced = with_object(texture_correlation=0.1, tail_share=0.4, median_residual=0.5, dissimilarity=-0.5)
+
+    assert log_odds(replaced, scale=0.4) == pytest.approx(SETTINGS.bias)
+
+
+def test_trust_in_appearance_falls_from_full_to_none() -> None:
+    middle = (SETTINGS.full_appearance_scale + SETTINGS.no_appearance_scale) / 2
+
+    assert appearance_trust(SETTINGS.full_appearance_scale, SETTINGS) == 1
+    assert appearance_trust(middle, SETTINGS) == pytest.approx(0.5)
+    assert appearance_trust(SETTINGS.no_appearance_scale, SETTINGS) == 0
+
+
+def test_few_compared_voxels_say_little() -> None:
+    values = dict(texture_correlation=0.1, tail_share=0.4, median_residual=0.5, dissimilarity=-0.5)
+
+    assert log_odds(with_object(**values, compared_count=5)) < 0 < log_odds(with_object(**values))
+
+
+def test_what_was_never_compared_is_judged_by_geometry_alone() -> None:
+    features = change_features(with_object(compared_count=0, dissimilarity=np.nan, seen_through=0.2))
+
+    assert features[-1].tolist() == [0.2, 0, 0, 0, 0]
+
+
+def test_the_stored_table_gives_the_same_log_odds_again() -> None:
+    evidence = with_object(texture_correlation=0.1, tail_share=0.4, median_residual=0.5, dissimilarity=-0.5)
+    odds = change_log_odds(evidence, AGREEING, SETTINGS)
+    table = evidence.table(odds)
+
+    assert change_log_odds(ObjectEvidence.from_table(table), AGREEING, SETTINGS)[1:] == pytest.approx(
+        odds[1:], abs=1e-4
+    )
+    assert table["log_odds"] == pytest.approx(odds[1:], abs=1e-5)
