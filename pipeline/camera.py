@@ -97,10 +97,26 @@ def invert_rigid(T_a_b: FloatArray) -> NDArray[np.float64]:
     return inverse
 
 
+# Rows of one product: larger ones wake BLAS threads, which costs far more than three columns are worth
+# (77,000 points on two busy cores: 58 ms at once, 4 ms in pieces, the same bits).
+_PIECE_ROWS = 4096
+
+
+def rotate_points(R_a_b: FloatArray, points_b: FloatArray) -> FloatArray:
+    """Turn points or directions, (N, 3) -> (N, 3), in the dtype of the points."""
+    turned = np.empty_like(points_b)
+    transposed = np.asarray(R_a_b).astype(points_b.dtype).T
+    for begin in range(0, len(points_b), _PIECE_ROWS):
+        piece = slice(begin, begin + _PIECE_ROWS)
+        np.matmul(points_b[piece], transposed, out=turned[piece])
+    return turned
+
+
 def transform_points(T_a_b: FloatArray, points_b: FloatArray) -> FloatArray:
-    """Apply a rigid transform to points, (..., 3) -> (..., 3), in the dtype of the points."""
-    rotation = T_a_b[:3, :3].astype(points_b.dtype)
-    return points_b @ rotation.T + T_a_b[:3, 3].astype(points_b.dtype)
+    """Apply a rigid transform (4, 4) to points, (N, 3) -> (N, 3), in the dtype of the points."""
+    moved = rotate_points(T_a_b[:3, :3], points_b)
+    moved += np.asarray(T_a_b[:3, 3]).astype(points_b.dtype)
+    return moved
 
 
 def is_rigid(T: FloatArray, tolerance: float = 1e-2) -> bool:

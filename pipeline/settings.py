@@ -178,8 +178,8 @@ class ChangeSettings:
     rule: Literal["evidence", "paper"] = setting(
         "evidence", "evidence = the place itself must have changed; paper = Eq. 8 alone"
     )
-    # Weights of change_score, from benchmarks/fit_change_score.py on scenes that no table reports; on the side
-    # of fewer false alarms than its optimum, as real depth is noisier than generated depth.
+    # Weights of change_score, from benchmarks/fit_change_score.py on scenes that no table reports; with fewer
+    # false alarms than at its optimum, as real depth is noisier than generated depth.
     bias: float = setting(-3.48, "log odds of a change before any evidence")
     seen_through_weight: float = setting(11.7, "log odds for a place that was seen to be empty")
     dissimilarity_weight: float = setting(0.44, "log odds per spread of patch dissimilarity")

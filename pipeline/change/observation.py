@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.camera import PinholeCamera
+from pipeline.camera import PinholeCamera, rotate_points
 from pipeline.mapping.colours import log_colour
 from pipeline.mapping.front_end import SessionGeometry
 from pipeline.mapping.surface import FusedSurface
@@ -84,7 +84,7 @@ def glimpse(
         log_gain: (3,) the keyframe's exposure.
     """
     points = surface.points_world[candidates] - T_world_camera[:3, 3].astype(np.float32)
-    points_camera = points @ T_world_camera[:3, :3].astype(np.float32)
+    points_camera = rotate_points(T_world_camera[:3, :3].T, points)
     pixels, depth = camera.project(points_camera)
     column, row = np.rint(pixels).astype(np.int32).T
     inside = (depth > settings.near_m) & (column >= 1) & (row >= 1)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.camera import PinholeCamera
+from pipeline.camera import PinholeCamera, invert_rigid, transform_points
 from pipeline.store.files import write_arrays
 
 MAX_SPLAT_RADIUS_PX = 3
@@ -33,7 +33,7 @@ class AccumulatedSubmap:
         """Add the points of a depth image (h, w) in metres, 0 = no measurement."""
         self.keyframe_count += 1
         points = camera.backproject(depth)[depth > 0].astype(np.float64)
-        world = points @ T_world_camera[:3, :3].T + T_world_camera[:3, 3]
+        world = transform_points(T_world_camera, points)
         self._points.append(_one_per_cell(world.astype(np.float32), self._voxel_size_m))
 
     def save(self, path: Path) -> None:
@@ -57,7 +57,7 @@ def splat_depth(
     Returns:
         (height, width) float32 metres along z; 0 where nothing is drawn.
     """
-    points_camera = (points_world - T_world_camera[:3, 3]) @ T_world_camera[:3, :3]
+    points_camera = transform_points(invert_rigid(T_world_camera), points_world.astype(np.float64))
     pixels, depth = camera.project(points_camera)
     column, row = np.round(pixels).astype(np.int64).T
     margin = MAX_SPLAT_RADIUS_PX

@@ -14,6 +14,7 @@ import open3d.core as o3c
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pipeline.camera import transform_points
 from pipeline.mapping.front_end import SessionGeometry
 
 CELL_VOXELS = 0.75
@@ -42,8 +43,7 @@ def dense_map(
         depth = geometry.store.depth(k)
         measured = depth > 0
         points_camera = geometry.strided_camera(k).backproject(depth)[measured]
-        rotation = keyframe.T_world_camera[:3, :3].astype(np.float32)
-        points = points_camera @ rotation.T + keyframe.T_world_camera[:3, 3].astype(np.float32)
+        points = transform_points(keyframe.T_world_camera, points_camera)
         if len(points):
             fresh = _first_in_cell(points, cell_m, taken)
             points_parts.append(points[fresh])

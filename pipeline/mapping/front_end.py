@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.camera import PinholeCamera
+from pipeline.camera import PinholeCamera, rotate_points, transform_points
 from pipeline.errors import InputError
 from pipeline.mapping.accumulation import AccumulatedSubmap
 from pipeline.mapping.colours import VoxelColours
@@ -148,16 +148,12 @@ def map_session(
         camera = frame.camera.strided(stride)
         geometry = depth_geometry(depth, camera, settings.surface.min_incidence_cosine)
         reliable = geometry.is_reliable
-        rotation = frame.T_world_camera[:3, :3].astype(np.float32)
-        points = geometry.points_camera[reliable] @ rotation.T + frame.T_world_camera[:3, 3].astype(
-            np.float32
-        )
+        points = transform_points(frame.T_world_camera, geometry.points_camera[reliable])
+        normals = rotate_points(frame.T_world_camera[:3, :3], geometry.normals_camera[reliable])
         small = np.ascontiguousarray(cv2.blur(rgb, (_COLOUR_BLUR_PX, _COLOUR_BLUR_PX))[::stride, ::stride])
         lab = cv2.cvtColor(small.astype(np.float32) / 255, cv2.COLOR_RGB2Lab)
         voxels = np.full(depth.shape, -1, np.int32)
-        voxels[reliable] = fusion.add(
-            points, geometry.normals_camera[reliable] @ rotation.T, lab[reliable], frame.T_world_camera
-        )
+        voxels[reliable] = fusion.add(points, normals, lab[reliable], frame.T_world_camera)
         colours.add(voxels[reliable], small[reliable])
         store.save(k, depth, small, voxels)
         if submap.keyframe_count == settings.keyframes.submap_size:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.camera import PinholeCamera
+from pipeline.camera import PinholeCamera, rotate_points
 
 _NEAR_M = 0.05
 # A point stands for its pixel and the eight around it, so that a surface has no holes between its points.
@@ -28,7 +28,7 @@ def visible_points(
         (height, width) point numbers, -1 = none.
     """
     relative = points_world[candidates] - T_world_camera[:3, 3].astype(np.float32)
-    pixels, depth = camera.project(relative @ T_world_camera[:3, :3].astype(np.float32))
+    pixels, depth = camera.project(rotate_points(T_world_camera[:3, :3].T, relative))
     inside = (depth > _NEAR_M) & (pixels > -1.5).all(axis=1)
     inside &= (pixels[:, 0] < camera.width + 0.5) & (pixels[:, 1] < camera.height + 0.5)
     kept = np.flatnonzero(inside)

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.camera import PinholeCamera
+from pipeline.camera import PinholeCamera, transform_points
 from pipeline.errors import InputError, StorageError
 from pipeline.ply import NOT_SCORED, LabelledPoints, write_ply
 from pipeline.progress import ProgressEvent, Report, silent
@@ -25,7 +25,6 @@ from pipeline.synthetic.archive import ArchiveWriter
 from pipeline.synthetic.atlas import TextureAtlas
 from pipeline.synthetic.props import Workshop
 from pipeline.synthetic.render import Renderer
-from pipeline.synthetic.rigid import transformed
 from pipeline.synthetic.sensor import expose, measure, misplace
 from pipeline.synthetic.truth import SeenPoints, TruthSettings, assemble, label_points, observed
 from pipeline.synthetic.world import SensorSettings, SyntheticScene
@@ -143,7 +142,7 @@ def record(
         valid = (within > sensor.min_range_m) & (within < sensor.max_range_m)
         in_camera = scene.camera.strided(_TRUTH_STRIDE).backproject(np.where(valid, within, 0))[valid]
         owner = view.object_id[::_TRUTH_STRIDE, ::_TRUTH_STRIDE][valid]
-        return clouds[visit].thinned(transformed(T_world_camera, in_camera), owner)
+        return clouds[visit].thinned(transform_points(T_world_camera, in_camera), owner)
 
     for number, (points_world, owner) in enumerate(_in_order(keyframe, 2 * frames, workers)):
         clouds[number // frames].add(points_world, owner)

@@ -9,9 +9,8 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from pipeline.camera import PinholeCamera
+from pipeline.camera import PinholeCamera, rotate_points
 from pipeline.synthetic.atlas import TextureAtlas
-from pipeline.synthetic.rigid import rotated
 from pipeline.synthetic.shapes import Mesh
 from pipeline.synthetic.textures import noise
 from pipeline.synthetic.world import Lamp, Lighting
@@ -80,7 +79,7 @@ class Renderer:
             gloss=np.zeros(pixels, dtype=np.float32),
         )
         rays_camera = camera.backproject(np.ones((height, width), dtype=np.float32)).reshape(-1, 3)
-        directions = rotated(T_world_camera[:3, :3], rays_camera)
+        directions = rotate_points(T_world_camera[:3, :3], rays_camera)
         centre = T_world_camera[:3, 3].astype(np.float32)
         for begin in range(0, pixels, _BAND_PIXELS):
             band = slice(begin, min(begin + _BAND_PIXELS, pixels))

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.camera import PinholeCamera, invert_rigid
+from pipeline.camera import PinholeCamera, invert_rigid, transform_points
 from pipeline.ply import NOT_SCORED, LabelledPoints
 from pipeline.result import ChangeLabel
-from pipeline.synthetic.rigid import transformed
 
 # (camera centre in the world, points in the world) -> distance of the first hit over that of the point,
 # and the object hit; see Renderer.first_hit.
@@ -107,7 +106,7 @@ def observed(
         open_points = np.flatnonzero(~known)
         if not len(open_points):
             break
-        in_camera = transformed(invert_rigid(T_world_camera), points_world[open_points])
+        in_camera = transform_points(invert_rigid(T_world_camera), points_world[open_points])
         pixel, z = camera.project(in_camera)
         inside = (z > 0.1) & (z < max_range_m)
         inside &= (
