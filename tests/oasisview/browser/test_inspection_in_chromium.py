@@ -249,7 +249,9 @@ def test_accepting_goes_through_the_queue_in_order(app, opened, small_result_pat
     label = app.workbench.catalogue.objects[first].label
     user = inspector_of(app, view).user
     assert journal_rows(small_result_path) == [("accept", first, label, label, "", user)]
-    assert view.page.locator("[data-role=reviewed]").inner_text().startswith("1 of 9")
+    view.page.wait_for_function(
+        "() => document.querySelector('[data-role=reviewed]').innerText.startsWith('1 of 9')"
+    )
     view.page.locator('[data-send="filter"][aria-label^="static"]').click()
     view.page.wait_for_function(
         "() => document.querySelector('[data-role=reviewed]').innerText.includes('of 12')"
