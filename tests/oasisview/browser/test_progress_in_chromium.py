@@ -63,7 +63,7 @@ def test_progress_then_the_result_without_a_reload(
     page.wait_for_selector(".oa-row")
     page.wait_for_selector("#oa-band img")
     assert page.evaluate("() => window.unloaded") is False
-    assert page.locator("#oa-page").inner_html() == ""
+    page.wait_for_function("() => document.querySelector('#oa-page').innerHTML === ''")
 
 
 def test_a_failed_run_says_why(
