@@ -6,10 +6,13 @@ import json
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from hashlib import blake2b
+from itertools import count
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,30 +134,44 @@ class _Run:
         selected = tuple(select_keyframes(session, settings.keyframes) for session in self._sessions)
         # One voxel size for both visits, from the one that was there first.
         voxel_m = voxel_size_m(self._sessions[0], selected[0], settings)
-        geometries = []
-        for visit, (session, positions) in enumerate(zip(self._sessions, selected, strict=True)):
-            stage = f"map_{VISITS[visit]}"
-            with self._stage(stage) as is_done:
-                folder = self._writer.work / stage
-                if is_done:
-                    store, submaps = reopen_stores(folder, voxel_m, settings)
-                    stride = settings.image.geometry_stride
-                    geometry = checkpoint.load_geometry(self._writer, visit, store, submaps, stride)
-                else:
-                    geometry = map_session(
-                        session,
-                        positions,
-                        voxel_m,
-                        self._extractor,
-                        settings,
-                        folder,
-                        self._sinks(visit),
-                        on_keyframe=self._progress(stage, len(positions)),
-                        warn=self._warn,
-                    )
-                    checkpoint.save_geometry(self._writer, visit, geometry)
-            geometries.append(geometry)
-        return geometries[0], geometries[1]
+        warnings: tuple[list[str], list[str]] = ([], [])
+        with ThreadPoolExecutor(len(VISITS)) as threads:
+            mapped = [
+                threads.submit(self._map_visit, visit, selected[visit], voxel_m, warnings[visit])
+                for visit in range(len(VISITS))
+            ]
+        # In visit order whichever thread was first: the same inputs give the same bytes.
+        self._warnings += warnings[0] + warnings[1]
+        return mapped[0].result(), mapped[1].result()
+
+    def _map_visit(
+        self, visit: int, positions: tuple[int, ...], voxel_m: float, warnings: list[str]
+    ) -> SessionGeometry:
+        stage = f"map_{VISITS[visit]}"
+
+        def warn(line: str) -> None:
+            warnings.append(line)
+            self._report(Warned(line))
+
+        with self._stage(stage, warnings) as is_done:
+            folder = self._writer.work / stage
+            if is_done:
+                store, submaps = reopen_stores(folder, voxel_m, self._settings)
+                stride = self._settings.image.geometry_stride
+                return checkpoint.load_geometry(self._writer, visit, store, submaps, stride)
+            geometry = map_session(
+                self._sessions[visit],
+                positions,
+                voxel_m,
+                self._extractor,
+                self._settings,
+                folder,
+                self._sinks(visit),
+                on_keyframe=self._progress(stage, len(positions)),
+                warn=warn,
+            )
+            checkpoint.save_geometry(self._writer, visit, geometry)
+            return geometry
 
     def _sinks(self, visit: int) -> KeyframeSinks:
         def write_image(frame_index: int, rgb: NDArray[np.uint8]) -> None:
@@ -186,26 +203,29 @@ class _Run:
     ) -> tuple[SessionObjects, SessionObjects]:
         observed = (observation.of_previous, observation.of_current)
         is_noise = (observation.is_noise0, observation.is_noise1)
-        found = []
+
+        def find(visit: int) -> SessionObjects:
+            geometry = geometries[visit]
+            objects = find_objects(
+                geometry,
+                observed[visit].is_seen_through(self._settings.observation),
+                is_noise[visit],
+                mask_generator(self._settings),
+                self._extractor,
+                self._features(visit, geometry),
+                partial(self._image, visit, geometry),
+                self._settings,
+            )
+            checkpoint.save_objects(self._writer, visit, objects)
+            return objects
+
         with self._stage("objects") as is_done:
-            for visit, geometry in enumerate(geometries):
-                if is_done:
-                    found.append(checkpoint.load_objects(self._writer, visit))
-                    continue
-                objects = find_objects(
-                    geometry,
-                    observed[visit].is_seen_through(self._settings.observation),
-                    is_noise[visit],
-                    mask_generator(self._settings),
-                    self._extractor,
-                    self._features(visit, geometry),
-                    partial(self._image, visit, geometry),
-                    self._settings,
-                )
-                checkpoint.save_objects(self._writer, visit, objects)
-                found.append(objects)
-                self._report(ProgressEvent("objects", visit + 1, 2))
-        return found[0], found[1]
+            if is_done:
+                return checkpoint.load_objects(self._writer, 0), checkpoint.load_objects(self._writer, 1)
+            with ThreadPoolExecutor(len(VISITS)) as threads:
+                previous, current = threads.map(find, range(len(VISITS)))
+            self._report(ProgressEvent("objects", 2, 2))
+            return previous, current
 
     def _visit_images(
         self,
@@ -260,16 +280,20 @@ class _Run:
         covisible = (covisibility.of_previous, covisibility.of_current)
         total = sum(len(visit.geometry.keyframes) for visit in visits)
         started = time.perf_counter()
-        written = 0
+        step = self._counter("write", total)
+        with ThreadPoolExecutor(len(VISITS)) as threads:
+            maps = list(
+                threads.map(
+                    lambda images: dense_map(images.geometry, images.objects.instance_of_voxel, step), visits
+                )
+            )
         for visit, images in enumerate(visits):
             geometry, session = images.geometry, self._sessions[visit]
             for k, keyframe in enumerate(geometry.keyframes):
                 self._writer.write_mask(
                     visit, keyframe.frame_index, ids[visit][images.objects.mask(geometry, k)]
                 )
-            on_keyframe = self._progress("write", total, written)
-            points = dense_map(geometry, images.objects.instance_of_voxel, on_keyframe)
-            written += len(geometry.keyframes)
+            points = maps[visit]
             self._writer.write_map(visit, points.points_world, points.colours, ids[visit][points.instances])
             self._writer.write_session(
                 visit,
@@ -321,30 +345,42 @@ class _Run:
     def _image(self, visit: int, geometry: SessionGeometry, k: int) -> NDArray[np.uint8]:
         return self._writer.read_image(visit, geometry.keyframes[k].frame_index)
 
-    def _warn(self, line: str) -> None:
-        self._warnings.append(line)
-        self._report(Warned(line))
+    def _progress(self, stage: str, total: int) -> Callable[[int], None]:
+        return lambda done: self._report(ProgressEvent(stage, done, total))
 
-    def _progress(self, stage: str, total: int, before: int = 0) -> Callable[[int], None]:
-        return lambda done: self._report(ProgressEvent(stage, before + done, total))
+    def _counter(self, stage: str, total: int) -> Callable[[int], None]:
+        """Progress of a stage that several threads work on: every call is one step more."""
+        numbers, lock = count(1), Lock()
+
+        def step(_: int) -> None:
+            with lock:
+                self._report(ProgressEvent(stage, next(numbers), total))
+
+        return step
 
     @contextmanager
-    def _stage(self, name: str) -> Iterator[bool]:
-        """Time a stage and mark it done; yields whether it was done before (a resumed run)."""
+    def _stage(self, name: str, warnings: list[str] | None = None) -> Iterator[bool]:
+        """Time a stage and mark it done; yields whether it was done before (a resumed run).
+
+        Args:
+            name: of the stage.
+            warnings: collects what the stage warns about, and gets back what it warned about before.
+        """
+        warnings = [] if warnings is None else warnings
         if self._writer.stage_done(name):
             info = self._writer.stage_info(name)
             self._timings_s[name] = info["seconds"]
-            self._warnings += [line for line in info["warnings"] if line not in self._warnings]
+            warnings += info["warnings"]
             yield True
             return
-        started, warned = time.perf_counter(), len(self._warnings)
+        started = time.perf_counter()
         try:
             yield False
         except (MemoryError, RecursionError) as error:
             raise OasisError(f"stage {name!r} ran out of memory", "raise surface.voxel_size_m") from error
         seconds = round(time.perf_counter() - started, 3)
         self._timings_s[name] = seconds
-        self._writer.mark_stage(name, {"seconds": seconds, "warnings": self._warnings[warned:]})
+        self._writer.mark_stage(name, {"seconds": seconds, "warnings": warnings})
 
 
 def _keyframe_records(

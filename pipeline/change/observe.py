@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import count
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.change.observation import Observation, glimpses
+from pipeline.change.observation import Glimpse, Observation, glimpses
 from pipeline.mapping.front_end import SessionGeometry
 from pipeline.settings import Settings
+
+VIEWING_THREADS = 2
 
 
 @dataclass(frozen=True)
@@ -39,32 +44,39 @@ def observe(
     settings: Settings,
     on_keyframe: Callable[[int], None],
 ) -> MutualObservation:
-    """Let every keyframe of either visit look at both surfaces."""
-    done = 0
+    """Let every keyframe of either visit look at both surfaces; the four views are independent threads."""
+    numbers, lock = count(1), Lock()
+
+    def views(observed: SessionGeometry, observer: SessionGeometry) -> Iterator[Glimpse]:
+        for seen in glimpses(observed, observer, settings.observation, settings.image.max_depth_m):
+            yield seen
+            with lock:
+                on_keyframe(next(numbers))
 
     def look(observed: SessionGeometry, observer: SessionGeometry) -> Observation:
-        nonlocal done
         observation = Observation(len(observed.surface.points_world))
-        for seen in glimpses(observed, observer, settings.observation, settings.image.max_depth_m):
+        for seen in views(observed, observer):
             observation.add(seen)
-            done += 1
-            on_keyframe(done)
         return observation
 
-    is_noise = [look(visit, visit).is_contradicted(settings.observation) for visit in (previous, current)]
-    of_current = look(current, previous)
-    voxel_count = len(previous.surface.points_world)
-    of_previous, submap_view = Observation(voxel_count), Observation(voxel_count)
-    by_submap: list[dict[str, NDArray[np.generic]]] = []
-    views = glimpses(previous, current, settings.observation, settings.image.max_depth_m)
-    for k, seen in enumerate(views):
-        submap_view.add(seen)
-        done += 1
-        on_keyframe(done)
-        is_last = k + 1 == len(current.keyframes)
-        if is_last or current.keyframes[k + 1].submap != current.keyframes[k].submap:
-            sparse = submap_view.to_sparse()
-            of_previous.add_sparse(sparse)
-            by_submap.append(sparse)
-            submap_view = Observation(voxel_count)
-    return MutualObservation(of_current, of_previous, is_noise[0], is_noise[1], tuple(by_submap))
+    def look_by_submap() -> tuple[dict[str, NDArray[np.generic]], ...]:
+        voxel_count = len(previous.surface.points_world)
+        submap_view = Observation(voxel_count)
+        by_submap = []
+        for k, seen in enumerate(views(previous, current)):
+            submap_view.add(seen)
+            is_last = k + 1 == len(current.keyframes)
+            if is_last or current.keyframes[k + 1].submap != current.keyframes[k].submap:
+                by_submap.append(submap_view.to_sparse())
+                submap_view = Observation(voxel_count)
+        return tuple(by_submap)
+
+    with ThreadPoolExecutor(VIEWING_THREADS) as threads:
+        own = [threads.submit(look, visit, visit) for visit in (previous, current)]
+        of_current = threads.submit(look, current, previous)
+        by_submap = threads.submit(look_by_submap)
+    of_previous = Observation(len(previous.surface.points_world))
+    for sparse in by_submap.result():
+        of_previous.add_sparse(sparse)
+    is_noise = [view.result().is_contradicted(settings.observation) for view in own]
+    return MutualObservation(of_current.result(), of_previous, is_noise[0], is_noise[1], by_submap.result())
