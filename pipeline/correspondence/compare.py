@@ -7,7 +7,10 @@ the submap of the current keyframe.
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import count
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +28,21 @@ from pipeline.result import CovisiblePair, PatchLinks
 from pipeline.settings import CorrespondenceSettings, Settings
 
 GEOMETRIC_HEATMAP_STRIDE = 4
+
+COMPARING_THREADS = 2
+# Outcomes wait in order; a few at once keep memory small.
+_PAIRS_AT_ONCE = 16
+
+
+@dataclass(frozen=True)
+class _PairOutcome:
+    """What comparing one pair of keyframes gave; see ``DenseMatches`` and ``best_nearby``."""
+
+    links: PatchLinks
+    correspondences: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]
+    nearby0: NDArray[np.float32]
+    nearby1: NDArray[np.float32]
+    light: NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -134,36 +152,56 @@ def compare(
     similarity = [[PlaceSimilarity.empty(count) for _ in submaps] for count in counts]
     lights = []
     steps = len(pairs) + len(previous.geometry.keyframes) + len(current.geometry.keyframes)
-    for step, (k0, k1) in enumerate(pairs):
+
+    def compare_pair(pair: tuple[int, int]) -> _PairOutcome:
+        k0, k1 = pair
         view0, view1 = covisibility.views0[k0], covisibility.views1[k1]
         stored0, stored1 = previous.features(k0), current.features(k1)
         into_previous = patch_warp(view1, view0)
         light = extractor.light(stored0, stored1, into_previous)
         matches = match(*extractor.comparable(stored0, stored1, light))
         shape0, shape1 = stored0.shape[:2], stored1.shape[:2]
-        write_links(k0, k1, matches.links(shape0, shape1))
-        p, q, score = matches.correspondences()
-        submap = current.geometry.keyframes[k1].submap
-        (shares0, owners0), (shares1, owners1) = shown[0](k0), shown[1](k1)
-        evidence[submap].add(owners0[p], owners1[q], score)
-        nearby0 = best_nearby(matches.correlation, patch_warp(view0, view1), shape1, radius)
-        nearby1 = best_nearby(matches.correlation.T, into_previous, shape0, radius)
-        for visit, (k, nearby, shares) in enumerate(((k0, nearby0, shares0), (k1, nearby1, shares1))):
-            best[visit].add(k, nearby)
-            similarity[visit][submap].add(shares, nearby.reshape(-1))
-        lights.append(light)
-        on_step(step + 1, steps)
-    done = len(pairs)
+        return _PairOutcome(
+            links=matches.links((shape0[0], shape0[1]), (shape1[0], shape1[1])),
+            correspondences=matches.correspondences(),
+            nearby0=best_nearby(matches.correlation, patch_warp(view0, view1), shape1, radius),
+            nearby1=best_nearby(matches.correlation.T, into_previous, shape0, radius),
+            light=light,
+        )
+
+    with ThreadPoolExecutor(COMPARING_THREADS) as threads:
+        for begin in range(0, len(pairs), _PAIRS_AT_ONCE):
+            some = pairs[begin : begin + _PAIRS_AT_ONCE]
+            for (k0, k1), outcome in zip(some, threads.map(compare_pair, some), strict=True):
+                write_links(k0, k1, outcome.links)
+                (shares0, owners0), (shares1, owners1) = shown[0](k0), shown[1](k1)
+                p, q, score = outcome.correspondences
+                submap = current.geometry.keyframes[k1].submap
+                evidence[submap].add(owners0[p], owners1[q], score)
+                for visit, (k, nearby, shares) in enumerate(
+                    ((k0, outcome.nearby0, shares0), (k1, outcome.nearby1, shares1))
+                ):
+                    best[visit].add(k, nearby)
+                    similarity[visit][submap].add(shares, nearby.reshape(-1))
+                lights.append(outcome.light)
+            on_step(begin + len(some), steps)
     covisible = (covisibility.of_previous, covisibility.of_current)
-    for visit, (own, other) in enumerate(((previous, current), (current, previous))):
-        for k in range(len(own.geometry.keyframes)):
+    visits, numbers, lock = (previous, current), count(len(pairs) + 1), Lock()
+
+    def draw_heatmaps(visit: int) -> None:
+        own, other = visits[visit].geometry, visits[1 - visit].geometry
+        for k in range(len(own.keyframes)):
             semantic = semantic_heatmap(
                 best[visit].of(k), extractor.similarity, settings.correspondence.heatmap_sigma_patches
             )
-            geometric = _geometric(own.geometry, other.geometry, k, covisible[visit][k], visit == 1)
-            write_heatmaps(visit, k, semantic, geometric)
-            done += 1
-            on_step(done, steps)
+            write_heatmaps(visit, k, semantic, _geometric(own, other, k, covisible[visit][k], visit == 1))
+            with lock:
+                on_step(next(numbers), steps)
+        # The surfaces of the other visit were needed for this only.
+        other.submaps.forget()
+
+    with ThreadPoolExecutor(COMPARING_THREADS) as threads:
+        list(threads.map(draw_heatmaps, range(2)))
     mean_light = np.mean(lights, axis=0) if lights and lights[0].size else None
     return Comparison(tuple(evidence), tuple(similarity[0]), tuple(similarity[1]), mean_light)
 

@@ -131,6 +131,10 @@ class SubmapSurfaces:
             nearest = np.where(seen, np.minimum(nearest, depth), nearest)
         return np.where(np.isfinite(nearest), nearest, 0).astype(np.float32)
 
+    def forget(self) -> None:
+        """Free the surfaces in memory; they are loaded again when a view needs them."""
+        self._loaded.clear()
+
     def _load(self, submap: int) -> LoadedSubmap:
         if submap in self._loaded:
             self._loaded.move_to_end(submap)
