@@ -44,10 +44,10 @@ class VoxelColours:
             voxels = raw_voxels[known]
             gain = np.median(colours[known] - self._sums[voxels] / self._counts[voxels, None], axis=0)
         self.log_gains.append(gain)
-        length = len(self._counts)
+        # Only the voxels in view are touched: the map may be a hundred times larger.
         for channel in range(3):
-            self._sums[:, channel] += np.bincount(raw_voxels, colours[:, channel] - gain[channel], length)
-        self._counts += np.bincount(raw_voxels, minlength=length)
+            np.add.at(self._sums[:, channel], raw_voxels, colours[:, channel] - gain[channel])
+        np.add.at(self._counts, raw_voxels, 1)
 
     def finish(self, remap: NDArray[np.int32], voxel_count: int) -> NDArray[np.float32]:
         """(voxel_count, 3) mean log RGB of the voxels that ``remap`` keeps."""

@@ -70,19 +70,21 @@ class VoxelFusion:
     def _numbers(self, unique_cells: NDArray[np.int32], keyframe: int) -> NDArray[np.int32]:
         keys = o3c.Tensor(np.ascontiguousarray(unique_cells))
         slots, found = self._index_of_key.find(keys)
-        is_new = ~found.numpy()
-        count = int(is_new.sum())
+        is_known = found.numpy()
+        numbers = np.empty(len(unique_cells), np.int32)
+        # Read before inserting: the map may move its slots when it grows.
+        numbers[is_known] = self._index_of_key.value_tensor().numpy()[slots.numpy()[is_known], 0]
+        count = len(unique_cells) - int(is_known.sum())
         if count:
             self._reserve(self._size + count)
             fresh = np.arange(self._size, self._size + count, dtype=np.int32)
             self._index_of_key.insert(
-                o3c.Tensor(np.ascontiguousarray(unique_cells[is_new])), o3c.Tensor(fresh[:, None])
+                o3c.Tensor(np.ascontiguousarray(unique_cells[~is_known])), o3c.Tensor(fresh[:, None])
             )
+            numbers[~is_known] = fresh
             self._first_keyframe[fresh] = keyframe
             self._size += count
-            slots, _ = self._index_of_key.find(keys)
-        values = self._index_of_key.value_tensor().numpy()
-        return values[slots.numpy(), 0].astype(np.int32)
+        return numbers
 
     def _reserve(self, size: int) -> None:
         while len(self._counts) < size:
