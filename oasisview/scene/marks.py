@@ -46,13 +46,16 @@ class Marks:
         self._mode, self._layers, self._dark = "after", Layers(), False
         self._names: dict[int, viser.LabelHandle] = {}
         self._timer: threading.Timer | None = None
+        # Names are arranged on a timer's thread: they must not be replaced by new ones meanwhile.
+        self._drawing = threading.RLock()
         self._keyframe_centre: NDArray[np.float64] | None = None
         self._selected: int | None = None
 
     def draw(self, mode: str, layers: Layers, *, dark: bool) -> None:
         """Boxes and names anew, after labels, the visit shown or the theme changed."""
-        self._mode, self._layers, self._dark = mode, layers, dark
-        self._boxes()
+        with self._drawing:
+            self._mode, self._layers, self._dark = mode, layers, dark
+            self._boxes()
 
     def close(self) -> None:
         """The tab is gone: nothing more is sent."""
@@ -61,7 +64,7 @@ class Marks:
 
     def select(self, item: MapObject | None) -> None:
         """Mark an object: a thick box with its name, where it was, and how it moved."""
-        with self._client.atomic():
+        with self._drawing, self._client.atomic():
             for name in ("box", "ghost", "way", "name", "points"):
                 self._remove(f"/map/selected/{name}")
             self._selected = item.object_id if item is not None else None
@@ -161,6 +164,10 @@ class Marks:
 
     def _arrange(self) -> None:
         """Show the names that can be read from here; the selected object has a larger one of its own."""
+        with self._drawing:
+            self._arrange_names()
+
+    def _arrange_names(self) -> None:
         names, camera = dict(self._names), self._client.camera
         try:
             rotation = vtf.SO3(np.asarray(camera.wxyz)).as_matrix()
