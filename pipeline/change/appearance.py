@@ -27,11 +27,13 @@ class AppearanceResidual:
         is_compared: (M,) both visits' colours are known.
         residual: (M, 3) log RGB difference, other visit minus own; zeros where not compared.
         scale: robust spread of the residual of the pair of visits (log units): the noise of appearance here.
+        log_gain: (3,) log RGB of the other visit's light over the own visit's.
     """
 
     is_compared: NDArray[np.bool_]
     residual: NDArray[np.float32]
     scale: float
+    log_gain: NDArray[np.float64]
 
 
 def appearance_residual(
@@ -50,7 +52,7 @@ def appearance_residual(
     difference = np.where(is_compared[:, None], other_log_colours - own_log_colours, 0).astype(np.float32)
     compared = np.flatnonzero(is_compared)
     if len(compared) < MIN_COMPARED_VOXELS:
-        return AppearanceResidual(is_compared, difference, MIN_SCALE)
+        return AppearanceResidual(is_compared, difference, MIN_SCALE, np.zeros(3))
     sample = compared[:: max(1, len(compared) // MAX_FITTED_VOXELS)]
     basis = _shading_basis(normals_world[sample].astype(np.float64))
     target = difference[sample].astype(np.float64)
@@ -69,7 +71,7 @@ def appearance_residual(
     residual = np.zeros_like(difference)
     shade = _shading_basis(normals_world[compared].astype(np.float64)) @ shading
     residual[compared] = difference[compared] - gain - shade[:, None]
-    return AppearanceResidual(is_compared, residual, scale)
+    return AppearanceResidual(is_compared, residual, scale, gain)
 
 
 def _shading_basis(normals: NDArray[np.float64]) -> NDArray[np.float64]:
