@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pipeline.evaluation.evaluator import evaluate, evaluate_result
+from pipeline.evaluation.ground_truth import GroundTruth, Motion, read_ground_truth
 from pipeline.evaluation.report import Report
 
-__all__ = ["Report", "evaluate", "evaluate_result"]
+__all__ = ["GroundTruth", "Motion", "Report", "evaluate", "evaluate_result", "read_ground_truth"]

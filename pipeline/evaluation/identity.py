@@ -72,7 +72,7 @@ def identity_scores(
     """Identities between two visits, for static and for moved objects."""
     found_before, found_after = previous.predicted_of_true(), current.predicted_of_true()
     truth_before, truth_after = previous.true_of_predicted(), current.true_of_predicted()
-    labels_before, labels_after = (_true_labels(units, session) for session in sessions)
+    labels_before, labels_after = (true_labels(units, session) for session in sessions)
     scores = {}
     for label in PERSISTENT:
         present = [
@@ -96,7 +96,7 @@ def identity_scores(
     return scores
 
 
-def _true_labels(units: Units, session: int) -> dict[int, int]:
+def true_labels(units: Units, session: int) -> dict[int, int]:
     """Most frequent scored label of each true object of a visit."""
     chosen = units.scored & (units.session == session) & (units.true_object > 0)
     objects, rows = np.unique(units.true_object[chosen], return_inverse=True)
