@@ -1,11 +1,12 @@
 """Association as in the paper's second table: static, moved and removed objects of the previous visit.
 
-Stricter than ``identity``: the label must be right too. A true object that stayed (or moved) is found when
-its majority prediction is the same object in both visits and carries the label static (or moved); a removed
-one when its majority prediction is labelled disappeared. Recall is found / N_gt. Precision, over the result's
-objects that claim the state: those whose true object (majority, the same in both visits for static and
-moved) has that state. Claims that lie on background only are counted apart, as in ``identity``: the
-paper annotates objects, and what lies on none of them is neither right nor wrong about an identity.
+Stricter than ``identity``: the label must be right too, and one object of the result cannot stand for several
+true ones. A true object that stayed (or moved) is found when its majority prediction is the same object in
+both visits, mostly consists of it in both, and carries the label static (or moved); a removed one when its
+majority prediction mostly consists of it and is labelled disappeared. Recall is found / N_gt. Precision, over
+the result's objects that claim the state: those whose true object (majority, the same in both visits for
+static and moved) has that state. Claims that lie on background only are counted apart, as in ``identity``:
+the paper annotates objects, and what lies on none of them is neither right nor wrong about an identity.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.evaluation.identity import true_labels
+from pipeline.evaluation.identity import kept_alone, true_labels
 from pipeline.evaluation.overlap import Overlap
 from pipeline.evaluation.units import Units
 from pipeline.result import ChangeLabel
@@ -82,7 +83,7 @@ def association_scores(
     predicted_labels: Mapping[int, ChangeLabel],
 ) -> dict[str, AssociationScores]:
     """Scores of each state in ``STATES`` between two visits."""
-    found_before, found_after = previous.predicted_of_true(), current.predicted_of_true()
+    found_before, alone = previous.predicted_of_true(), kept_alone(previous, current)
     truth_before, truth_after = previous.true_of_predicted(), current.true_of_predicted()
     labels_before, labels_after = (true_labels(units, session) for session in sessions)
 
@@ -92,10 +93,13 @@ def association_scores(
         return labels_before.get(true_id) == label == labels_after.get(true_id)
 
     def is_found(true_id: int, label: ChangeLabel) -> bool:
-        predicted = found_before[true_id]
-        if predicted == 0 or predicted_labels.get(predicted) != label:
-            return False
-        return label is ChangeLabel.DISAPPEARED or found_after[true_id] == predicted
+        if label is ChangeLabel.DISAPPEARED:
+            predicted = found_before[true_id]
+            is_own = predicted > 0 and truth_before[predicted] == true_id
+        else:
+            predicted = alone.get(true_id, 0)
+            is_own = predicted > 0
+        return is_own and predicted_labels.get(predicted) == label
 
     scores = {}
     for name, label in STATES.items():
