@@ -89,6 +89,8 @@ class MapObject:
             None without any link. For an object of both visits: its own instance in session 1.
         replaced_by, replaces: the other object of a *replaced* event, if any.
         sightings: one per visit that saw it, in visit order.
+        T_world_motion: 4x4 rigid motion row by row, p_current = T p_previous in the world frame, metres,
+            where it was estimated by registration; else None.
     """
 
     object_id: int
@@ -107,6 +109,7 @@ class MapObject:
     replaced_by: int | None
     replaces: int | None
     sightings: tuple[Sighting, ...]
+    T_world_motion: tuple[tuple[float, ...], ...] | None = None
 
     def sighting(self, session: int) -> Sighting | None:
         """The object's sighting in a visit, or None."""

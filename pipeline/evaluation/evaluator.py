@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
-from pipeline.errors import InputError
-from pipeline.evaluation.detection import THRESHOLDS, detection_scores
+from pipeline.evaluation.abstention import abstention_scores
+from pipeline.evaluation.association import association_scores
+from pipeline.evaluation.background import background_scores
+from pipeline.evaluation.calibration import calibration_scores
+from pipeline.evaluation.detection import THRESHOLDS, DetectionScores, detection_scores
 from pipeline.evaluation.displacement import displacement_scores
+from pipeline.evaluation.ground_truth import GroundTruth, read_ground_truth
 from pipeline.evaluation.identity import identity_scores
-from pipeline.evaluation.overlap import object_overlap
+from pipeline.evaluation.matched import Matched, match
 from pipeline.evaluation.pointwise import pointwise_scores
 from pipeline.evaluation.replaced import replaced_scores
 from pipeline.evaluation.report import Report
-from pipeline.evaluation.units import invented_labels, match_radius_m, match_units, predicted_points
-from pipeline.ply import LabelledPoints, read_ply
+from pipeline.evaluation.rotation import RotationScores, rotation_scores
+from pipeline.evaluation.units import invented_labels
+from pipeline.evaluation.verdicts import verdicts
+from pipeline.ply import LabelledPoints
 from pipeline.result import ChangeLabel, Result
 
 
 def evaluate(
     result_path: Path | str,
-    ground_truth_ply: Path | str,
+    ground_truth: Path | str,
     radius_m: float | None = None,
     labels: Mapping[int, ChangeLabel] | None = None,
 ) -> Report:
@@ -31,10 +34,12 @@ def evaluate(
 
     Args:
         result_path: the result folder.
-        ground_truth_ply: exact labels, objects and visits; label 255 = not scored.
+        ground_truth: exact labels, objects and visits; label 255 = not scored. Motions are read from
+            the JSON beside it, if there is one (see ``ground_truth``).
         radius_m: how far a map point may be from the ground truth it speaks for, metres; None = 0.1 m,
             or 1.5 times the spacing of the map's points where that is more.
-        labels: labels to score in place of the machine's (inspectors' overrides), by object id.
+        labels: labels to score in place of the machine's (inspectors' overrides), by object id; the
+            confidence stays the machine's.
 
     Raises:
         ResultError: the result cannot be opened.
@@ -42,42 +47,59 @@ def evaluate(
     """
     from pipeline.store import open_result
 
-    return evaluate_result(open_result(Path(result_path)), read_ply(Path(ground_truth_ply)), radius_m, labels)
+    return evaluate_result(open_result(Path(result_path)), read_ground_truth(ground_truth), radius_m, labels)
 
 
 def evaluate_result(
     result: Result,
-    truth: LabelledPoints,
+    truth: GroundTruth | LabelledPoints,
     radius_m: float | None = None,
     labels: Mapping[int, ChangeLabel] | None = None,
 ) -> Report:
     """Like :func:`evaluate`, for a result and a ground truth already in memory."""
-    if radius_m is not None and not (math.isfinite(radius_m) and radius_m > 0):
-        raise InputError(f"a match radius of {radius_m} m is impossible", "give a length above 0, in metres")
-    visits = predicted_points(result, labels)
-    radius = match_radius_m(visits) if radius_m is None else radius_m
-    units = match_units(truth, visits, radius)
+    if isinstance(truth, LabelledPoints):
+        truth = GroundTruth(truth)
+    return report_of(match(result, truth, radius_m, labels))
 
-    objects = {item.object_id: item for item in result.objects}
-    predicted_labels = {object_id: item.label for object_id, item in objects.items()} | dict(labels or {})
-    overlaps = [object_overlap(units, session) for session in range(len(visits))]
-    detection = []
-    for session, (visit, overlap) in enumerate(zip(visits, overlaps, strict=True)):
-        predicted_count = int(np.count_nonzero(np.unique(visit.object_id)))
-        detection += [
-            detection_scores(overlap, session, threshold, predicted_count) for threshold in THRESHOLDS
-        ]
-    identity, displacement = [], []
-    for pair in zip(range(len(visits)), range(1, len(visits)), strict=False):
-        scores = identity_scores(units, overlaps[pair[0]], overlaps[pair[1]], pair, predicted_labels)
+
+def report_of(matched: Matched) -> Report:
+    """Every metric of a matched result."""
+    units, overlaps, motions = matched.units, matched.overlaps, matched.truth.motions
+    identity, association, displacement, rotation = [], [], [], []
+    for pair in matched.pairs:
+        sides = (overlaps[pair[0]], overlaps[pair[1]])
+        scores = identity_scores(units, *sides, pair, matched.labels)
+        moved = scores[ChangeLabel.MOVED].pairs
         identity.append(scores)
-        displacement.append(displacement_scores(units, scores[ChangeLabel.MOVED].pairs, objects, pair))
+        association.append(association_scores(units, *sides, pair, matched.labels))
+        displacement.append(displacement_scores(units, moved, matched.objects, pair, motions))
+        rotation.append(
+            rotation_scores(moved, matched.objects, motions, matched.result.sessions[pair[0]].up_world)
+            if motions
+            else RotationScores(0, 0, 0, None, None, None)
+        )
+    found = verdicts(units, matched.result.objects, matched.labels)
     return Report(
-        radius_m=radius,
-        overridden=bool(labels),
-        pointwise=pointwise_scores(units, invented_labels(units, visits, radius)),
-        replaced=replaced_scores(units, result.replaced),
-        detection=tuple(detection),
+        radius_m=matched.radius_m,
+        overridden=matched.overridden,
+        pointwise=pointwise_scores(units, invented_labels(units, matched.visits, matched.radius_m)),
+        replaced=replaced_scores(units, matched.result.replaced),
+        detection=detections(matched),
         identity=tuple(identity),
+        association=tuple(association),
         displacement=tuple(displacement),
+        rotation=tuple(rotation),
+        background=background_scores(units, matched.visits),
+        verdicts=found,
+        calibration=calibration_scores(found),
+        abstention=abstention_scores(found),
+    )
+
+
+def detections(matched: Matched) -> tuple[DetectionScores, ...]:
+    """Detection of every visit at every threshold."""
+    return tuple(
+        detection_scores(overlap, session, threshold, matched.predicted_counts[session])
+        for session, overlap in enumerate(matched.overlaps)
+        for threshold in THRESHOLDS
     )

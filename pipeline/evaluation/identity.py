@@ -1,11 +1,12 @@
 """Identity across visits: is the same thing the same object afterwards?
 
 Recall, per true label: of the true objects that are static (or moved) and present in both visits, the
-share whose majority prediction carries the same ``object_id`` in both. Precision, per predicted label:
-of the result's objects with points in both visits, the share that lie on the same true object in both.
-Objects of the result that lie on true background in both visits are no statement about an identity: they
-are false positives of detection and are left out here. *Majority* is the object with most of the units, if it
-has a quarter of them at least.
+share whose majority prediction carries the same ``object_id`` in both. One object of the result may be the
+majority of several true ones (chairs merged into one): ``distinct`` counts only true objects that their
+prediction mostly consists of, in both visits. Precision, per predicted label: of the result's objects with
+points in both visits, the share that lie on the same true object in both. Objects of the result that lie on
+true background in both visits are no statement about an identity: they are false positives of detection and
+are left out here. *Majority* is the object with most of the units, if it has a quarter of them at least.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ class IdentityScores:
         kept, present: true objects that kept their id, of those in both visits.
         right, claimed: predicted objects that are one true object in both visits, of those that claim so.
         pairs: (true object, predicted object) of the kept ones.
+        distinct: kept ones whose predicted object is mostly theirs in both visits.
     """
 
     label: ChangeLabel
@@ -39,6 +41,12 @@ class IdentityScores:
     right: int
     claimed: int
     pairs: tuple[tuple[int, int], ...]
+    distinct: int = 0
+
+    @property
+    def distinct_recall(self) -> float | None:
+        """Share of identities kept by an object of their own; None when no object is in both visits."""
+        return self.distinct / self.present if self.present else None
 
     @property
     def recall(self) -> float | None:
@@ -56,6 +64,8 @@ class IdentityScores:
             "kept": self.kept,
             "present_in_both": self.present,
             "recall": self.recall,
+            "distinct": self.distinct,
+            "distinct_recall": self.distinct_recall,
             "right": self.right,
             "claimed_in_both": self.claimed,
             "precision": self.precision,
@@ -72,7 +82,8 @@ def identity_scores(
     """Identities between two visits, for static and for moved objects."""
     found_before, found_after = previous.predicted_of_true(), current.predicted_of_true()
     truth_before, truth_after = previous.true_of_predicted(), current.true_of_predicted()
-    labels_before, labels_after = (_true_labels(units, session) for session in sessions)
+    labels_before, labels_after = (true_labels(units, session) for session in sessions)
+    alone = kept_alone(previous, current)
     scores = {}
     for label in PERSISTENT:
         present = [
@@ -92,11 +103,32 @@ def identity_scores(
             and (truth_before[object_id] > 0 or truth_after[object_id] > 0)
         ]
         right = sum(truth_before[object_id] == truth_after[object_id] for object_id in claimed)
-        scores[label] = IdentityScores(label, len(pairs), len(present), right, len(claimed), pairs)
+        scores[label] = IdentityScores(
+            label,
+            kept=len(pairs),
+            present=len(present),
+            right=right,
+            claimed=len(claimed),
+            pairs=pairs,
+            distinct=sum(object_id in alone for object_id in present),
+        )
     return scores
 
 
-def _true_labels(units: Units, session: int) -> dict[int, int]:
+def kept_alone(previous: Overlap, current: Overlap) -> dict[int, int]:
+    """True object -> the predicted object that is its majority in both visits, and is mostly it."""
+    sides = [(overlap.predicted_of_true(), overlap.true_of_predicted()) for overlap in (previous, current)]
+    (before, truth_before), (after, truth_after) = sides
+    return {
+        true_id: predicted
+        for true_id, predicted in before.items()
+        if predicted > 0
+        and after.get(true_id) == predicted
+        and truth_before[predicted] == true_id == truth_after[predicted]
+    }
+
+
+def true_labels(units: Units, session: int) -> dict[int, int]:
     """Most frequent scored label of each true object of a visit."""
     chosen = units.scored & (units.session == session) & (units.true_object > 0)
     objects, rows = np.unique(units.true_object[chosen], return_inverse=True)

@@ -7,12 +7,17 @@ numbers with a single scene.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pipeline.evaluation.abstention import AbstentionScores, abstention_scores
+from pipeline.evaluation.calibration import CalibrationScores, calibration_scores
 from pipeline.evaluation.counts import Counts, mean_defined, pooled
+from pipeline.evaluation.identity import PERSISTENT
 from pipeline.evaluation.report import Report
+from pipeline.evaluation.tables import markdown, number
+from pipeline.evaluation.verdicts import pooled_verdicts
 from pipeline.result import ChangeLabel
 
 _CLASSES: dict[str, Callable[[Report], Counts]] = {
@@ -27,7 +32,7 @@ _CLASSES: dict[str, Callable[[Report], Counts]] = {
     "paper: moved": lambda report: report.replaced.moved,
     "replaced events": lambda report: report.replaced.events,
 }
-_PAIR_COLUMNS: dict[str, Callable[[Report], float | None]] = {
+PAIR_COLUMNS: dict[str, Callable[[Report], float | None]] = {
     "change F1": lambda report: report.pointwise.mean_change_f1,
     "static": lambda report: report.pointwise.per_label[ChangeLabel.STATIC].f1,
     "app.": lambda report: report.pointwise.per_label[ChangeLabel.APPEARED].f1,
@@ -41,7 +46,10 @@ _PAIR_COLUMNS: dict[str, Callable[[Report], float | None]] = {
     "det. R@.5": lambda report: _detection(report, 0.5).recall,
     "id static R": lambda report: _identity_recall(report, ChangeLabel.STATIC),
     "id moved R": lambda report: _identity_recall(report, ChangeLabel.MOVED),
+    "id P": lambda report: _identity_precision(report, PERSISTENT),
     "displ. err m": lambda report: mean_defined(item.mean_error_m for item in report.displacement),
+    "rot. err deg": lambda report: mean_defined(item.mean_error_deg for item in report.rotation),
+    "ECE": lambda report: report.calibration.ece,
 }
 
 
@@ -59,8 +67,10 @@ class Summary:
             "macro": {name: self.macro(name) for name in _CLASSES},
             "macro_columns": {
                 name: mean_defined(column(report) for report in self.reports.values())
-                for name, column in _PAIR_COLUMNS.items()
+                for name, column in PAIR_COLUMNS.items()
             },
+            "calibration": self.calibration().to_dict(),
+            "abstention": self.abstention().to_dict(),
         }
 
     def micro(self, name: str) -> Counts:
@@ -76,18 +86,35 @@ class Summary:
             "f1": mean_defined(item.f1 for item in counts),
         }
 
+    def calibration(self) -> CalibrationScores:
+        """Calibration over the objects of all pairs."""
+        return calibration_scores(pooled_verdicts([report.verdicts for report in self.reports.values()]))
+
+    def abstention(self) -> AbstentionScores:
+        """Abstention over the objects of all pairs."""
+        return abstention_scores(pooled_verdicts([report.verdicts for report in self.reports.values()]))
+
+    def mean(self, column: str) -> float | None:
+        """Mean of one of ``PAIR_COLUMNS`` over the pairs that define it."""
+        return mean_defined(PAIR_COLUMNS[column](report) for report in self.reports.values())
+
+    def worst(self, column: str) -> float | None:
+        """Smallest value of one of ``PAIR_COLUMNS`` over the pairs that define it."""
+        values = (PAIR_COLUMNS[column](report) for report in self.reports.values())
+        return min((value for value in values if value is not None), default=None)
+
     def pair_table(self) -> str:
         """Markdown: one row per pair, the mean below."""
         rows = [
-            [name, *(_number(column(report)) for column in _PAIR_COLUMNS.values())]
+            [name, *(number(column(report)) for column in PAIR_COLUMNS.values())]
             for name, report in self.reports.items()
         ]
         means = [
             mean_defined(column(report) for report in self.reports.values())
-            for column in _PAIR_COLUMNS.values()
+            for column in PAIR_COLUMNS.values()
         ]
-        rows.append(["**mean**", *(f"**{_number(mean)}**" for mean in means)])
-        return _markdown(["pair", *_PAIR_COLUMNS], rows)
+        rows.append(["**mean**", *(f"**{number(mean)}**" for mean in means)])
+        return markdown(["pair", *PAIR_COLUMNS], rows)
 
     def class_table(self) -> str:
         """Markdown: one row per class with pooled counts, micro ratios and macro ratios."""
@@ -98,11 +125,11 @@ class Summary:
                 [
                     name,
                     *map(str, (micro.tp, micro.fp, micro.fn)),
-                    *map(_number, (micro.precision, micro.recall, micro.f1)),
-                    *map(_number, macro.values()),
+                    *map(number, (micro.precision, micro.recall, micro.f1)),
+                    *map(number, macro.values()),
                 ]
             )
-        return _markdown(
+        return markdown(
             ["class", "TP", "FP", "FN", "P", "R", "F1", "macro P", "macro R", "macro F1"],
             rows,
         )
@@ -117,14 +144,10 @@ def _identity_recall(report: Report, label: ChangeLabel) -> float | None:
     return _share(sum(item.kept for item in scores), sum(item.present for item in scores))
 
 
+def _identity_precision(report: Report, labels: tuple[ChangeLabel, ...]) -> float | None:
+    scores = [pair[label] for pair in report.identity for label in labels]
+    return _share(sum(item.right for item in scores), sum(item.claimed for item in scores))
+
+
 def _share(part: int, whole: int) -> float | None:
     return part / whole if whole else None
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"
-
-
-def _markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [header, ["---", *["---:"] * (len(header) - 1)], *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

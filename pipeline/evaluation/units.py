@@ -139,7 +139,7 @@ def invented_labels(units: Units, visits: tuple[MapPoints, ...], radius_m: float
     for index, visit in enumerate(visits):
         if len(visit.points_world) == 0:
             continue
-        points, (label,) = _voxel_means(visit.points_world, [visit.label])
+        points, (label,) = voxel_means(visit.points_world, [visit.label])
         truth = units.points_world[units.session == index]
         if len(truth):
             distance, _ = cKDTree(truth).query(points, distance_upper_bound=radius_m)
@@ -169,14 +169,14 @@ def _check(truth: LabelledPoints, session_count: int) -> None:
 def _bin(
     truth: LabelledPoints,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    points, (session, label, object_id) = _voxel_means(
+    points, (session, label, object_id) = voxel_means(
         truth.points_world, [truth.session, truth.label, truth.object_id]
     )
     return points, session, label, object_id
 
 
-def _voxel_means(
-    points_world: NDArray[np.float32], keys: list[NDArray]
+def voxel_means(
+    points_world: NDArray[np.floating], keys: list[NDArray]
 ) -> tuple[NDArray[np.float64], list[NDArray[np.int64]]]:
     """Mean position of the points that share a voxel and every key, and those keys."""
     cells = np.floor(np.asarray(points_world, dtype=np.float64) / UNIT_SIZE_M).astype(np.int64)

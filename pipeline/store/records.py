@@ -59,10 +59,15 @@ def objects_from_dict(record: Mapping[str, Any]) -> tuple[MapObject, ...]:
                 "label": ChangeLabel[item["label"].upper()],
                 "case": MatchCase(item["case"]),
                 "sightings": tuple(_sighting(sighting) for sighting in item["sightings"]),
+                "T_world_motion": _matrix(item.get("T_world_motion")),
             }
         )
         for item in record["objects"]
     )
+
+
+def _matrix(rows: Sequence[Sequence[float]] | None) -> tuple[tuple[float, ...], ...] | None:
+    return None if rows is None else tuple(tuple(row) for row in rows)
 
 
 def _sighting(record: Mapping[str, Any]) -> Sighting:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.camera import PinholeCamera
-from pipeline.synthetic import goods, street, textures, vehicles
+from pipeline.synthetic import goods, prints, street, textures, vehicles
+from pipeline.synthetic.changes import Reach, Rearrangement, Spot, draw_mix
+from pipeline.synthetic.footprint import Area
 from pipeline.synthetic.lighting import daylight
 from pipeline.synthetic.paths import walk
-from pipeline.synthetic.props import Arrangement, Prop, Workshop, fates, nudge
+from pipeline.synthetic.props import Arrangement, Prop, Workshop
 from pipeline.synthetic.shapes import Mesh, box, join, pose
 from pipeline.synthetic.world import SensorSettings, SyntheticScene
 
@@ -55,7 +57,12 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
     rows = [-near, near, near + _BAY_DEPTH_M + 0.6]
     half_length = bays * bay / 2
     plan = Arrangement()
-    spots: list[tuple[np.ndarray, Prop]] = []
+    spots: list[Spot] = []
+
+    def other_car() -> Prop:
+        paint = vehicles.PAINTS[int(rng.integers(len(vehicles.PAINTS)))]
+        return vehicles.car(shop, str(rng.choice(list(vehicles.FAMILIES))), shop.near(paint, 8))
+
     favourites = [
         (str(rng.choice(list(vehicles.FAMILIES))), vehicles.PAINTS[int(rng.integers(len(vehicles.PAINTS)))])
         for _ in range(shop.count(4, 6))
@@ -66,21 +73,26 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
             if rng.random() > taken:
                 continue
             family, paint = favourites[int(rng.integers(len(favourites)))]
-            if rng.random() < 0.4:
-                family = str(rng.choice(list(vehicles.FAMILIES)))
-                paint = vehicles.PAINTS[int(rng.integers(len(vehicles.PAINTS)))]
+            car = other_car() if rng.random() < 0.4 else vehicles.car(shop, family, shop.near(paint, 8))
             heading = np.pi / 2 if rng.random() < 0.5 else -np.pi / 2
-            x = (number + 0.5 - bays / 2) * bay + rng.normal(0, 0.08)
-            T = pose(x, row + rng.normal(0, 0.12), 0, heading + rng.normal(0, 0.02))
-            spots.append((T, vehicles.car(shop, family, shop.near(paint, 8))))
-    share = shop.between(0.14, 0.19)
-    dealt = fates(rng, len(spots), moved=share, spare=share, disappeared=0.1, appeared=0.1, replaced=0.22)
-    free = [T for (T, _), fate in zip(spots, dealt, strict=True) if fate == "spare"]
-    for (T, car), fate in zip(spots, dealt, strict=True):
-        if fate == "spare":
-            continue
-        goal = free.pop() if fate == "moved" and free else None
-        plan.deal(fate, car, T, goal, nudge(rng, 0.06, 0.015))
+            middle = pose((number + 0.5 - bays / 2) * bay, row, 0)
+            T = middle @ pose(rng.normal(0, 0.08), rng.normal(0, 0.12), 0, heading + rng.normal(0, 0.02))
+            lot = Area(middle, bay / 2 + 0.1, _BAY_DEPTH_M / 2 + 0.3)
+            spots.append(Spot(T, car, lot, "bay", weight=1.5 if row is not rows[2] else 0.7))
+
+    # Small things along the aisle, out of the way of cars.
+    for x in np.arange(-half_length + 1, half_length - 1, shop.between(1.6, 2.4)):
+        side = rng.choice([-1, 1])
+        lane = Area(pose(0, float(side) * (aisle / 2 - 0.55), 0), half_length, 0.6)
+        T = lane.T_world_area @ pose(x, shop.between(-0.2, 0.2), 0, shop.between(-np.pi, np.pi))
+        spots.append(Spot(T, lane_thing(shop), lane, "lane", weight=0.8))
+
+    def substitute(spot: Spot) -> Prop:
+        return other_car() if spot.group == "bay" else lane_thing(shop)
+
+    mix = draw_mix(shop, len(spots), seed % 3 == 2, (0.09, 0.09, 0.18), spare=0.7)
+    reach = Reach(shift_m=(0.15, 0.6), nudge_m=0.06, nudge_rad=0.015)
+    Rearrangement(shop, spots, substitute, reach=reach).deal(mix, plan)
 
     edge = rows[2] + _BAY_DEPTH_M / 2 + 0.4
     for x in np.linspace(-half_length + 1, half_length - 1, shop.count(2, 4)):
@@ -88,10 +100,7 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
     for x in rng.uniform(-half_length, half_length, shop.count(3, 5)):
         side = rng.choice([-1, 1])
         plan.keep(street.tree(shop, shop.between(3.5, 5.5)), pose(x, side * (edge + 2.2), 0))
-    for at in np.linspace(-half_length + 1.5, half_length - 1.5, shop.count(4, 6)):
-        T = pose(at, rng.choice([-1, 1]) * (aisle / 2 - shop.between(0.1, 0.5)), 0, shop.between(-3, 3))
-        plan.deal(str(rng.choice(["appeared", "disappeared", "static"])), goods.cone(shop), T)
-
+    partial = shop.count(0, 1)
     return SyntheticScene(
         name="carpark",
         seed=seed,
@@ -99,7 +108,10 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
         background=ground(shop, bays, bay, rows, half_length),
         objects=plan.objects(rng),
         lighting=(daylight(shop), daylight(shop)),
-        paths=(_tour(shop, 0, half_length, aisle, frames), _tour(shop, 1, half_length, aisle, frames)),
+        paths=(
+            _tour(shop, partial == 0, half_length, aisle, frames),
+            _tour(shop, partial == 1, half_length, aisle, frames),
+        ),
         camera=camera,
         sensor=OUTDOOR_SENSOR,
         truth_voxel_m=0.05,
@@ -116,22 +128,41 @@ OUTDOOR_SENSOR = SensorSettings(
 )
 
 
-def _tour(shop: Workshop, visit: int, half_length: float, aisle: float, frames: int) -> np.ndarray:
-    """Up the aisle on one side looking obliquely at the other, and back."""
+def lane_thing(shop: Workshop) -> Prop:
+    """Something that stands about in a car park."""
+    match int(shop.rng.integers(6)):
+        case 0 | 1:
+            return goods.cone(shop)
+        case 2:
+            return street.trolley(shop, prints.vivid(shop.rng, 60, 200))
+        case 3:
+            return street.wheelie_bin(shop, prints.vivid(shop.rng, 40, 130))
+        case 4:
+            size = (shop.between(0.5, 0.8), shop.between(0.4, 0.6), shop.between(0.3, 0.6))
+            return goods.crate(shop, size, shop.near((160, 120, 78), 24))
+        case _:
+            return goods.pallet(shop)
+
+
+def _tour(shop: Workshop, partial: bool, half_length: float, aisle: float, frames: int) -> np.ndarray:
+    """Up the aisle on one side looking obliquely at the other, and back; a partial one begins late."""
     rng = shop.rng
-    height = shop.between(2.9, 3.5)
-    ahead, offset = shop.between(2.5, 5.0), aisle / 2 * shop.between(0.25, 0.55)
-    begin = -half_length - 2.5 if visit == 0 else -half_length * shop.between(0.6, 0.95)
+    height = shop.between(2.5, 3.7)
+    ahead, offset = shop.between(2.0, 5.5), aisle / 2 * shop.between(0.2, 0.6)
+    begin = -half_length * shop.between(0.3, 0.7) if partial else -half_length - shop.between(1.5, 3.0)
+    first = float(rng.choice([-1, 1]))  # the side walked along first
+    far = {1.0: 3.2, -1.0: 2.6}
     positions, targets = [], []
     for x in np.linspace(begin, half_length - 0.5, 6):
-        positions.append((x, -offset, height))
-        targets.append((x + ahead, aisle / 2 + 3.2, 0.4))
+        positions.append((x, -first * offset, height))
+        targets.append((x + ahead, first * (aisle / 2 + far[first]), 0.4))
     positions.append((half_length + 1.0, 0, height))
-    targets.append((half_length - 3.0, aisle / 2 + 1, 0.5))
-    positions.append((half_length + 1.2, offset * 0.7, height))
-    targets.append((half_length - 5.0, -aisle / 2, 0.5))
-    for x in np.linspace(half_length, begin + 0.3 * half_length * visit, 6):
-        positions.append((x, offset, height))
-        targets.append((x - ahead, -aisle / 2 - 2.6, 0.4))
-    order = slice(None) if visit == 0 or rng.random() < 0.5 else slice(None, None, -1)
+    targets.append((half_length - 3.0, first * (aisle / 2 + 1), 0.5))
+    positions.append((half_length + 1.2, first * offset * 0.7, height))
+    targets.append((half_length - 5.0, -first * aisle / 2, 0.5))
+    stop = begin + (0.4 * half_length if partial else 0.0)
+    for x in np.linspace(half_length, stop, 6):
+        positions.append((x, first * offset, height + shop.between(-0.2, 0.2)))
+        targets.append((x - ahead, -first * (aisle / 2 + far[-first]), 0.4))
+    order = slice(None) if rng.random() < 0.5 else slice(None, None, -1)
     return walk(np.array(positions)[order], np.array(targets)[order], frames, rng, 0.04)

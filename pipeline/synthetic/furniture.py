@@ -55,7 +55,7 @@ def chair(shop: Workshop, colour: Colour, width: float = 0.46) -> Prop:
         for x in (-half, half - 0.03):
             for y in (-half, half - 0.03):
                 parts.append(box((x, y, 0), (x + 0.03, y + 0.03, 0.44), metal))
-    return Prop("chair", join(parts), lambda: chair(shop, shop.near(colour), width))
+    return Prop("chair", join(parts), lambda: chair(shop, shop.near(colour), width), tips=True)
 
 
 def monitor(shop: Workshop, width: float) -> Prop:
@@ -81,7 +81,7 @@ def desk_lamp(shop: Workshop, colour: Colour) -> Prop:
         cylinder(0.013, height - 0.1, metal, 0.3, segments=8).at(z=0.02),
         cylinder(0.11, 0.15, shade, 0.3, top=0.06).at(z=height - 0.12),
     ]
-    return Prop("lamp", join(parts), lambda: desk_lamp(shop, shop.near(colour)))
+    return Prop("lamp", join(parts), lambda: desk_lamp(shop, shop.near(colour)), 0, True, True)
 
 
 def mug(shop: Workshop, colour: Colour) -> Prop:
@@ -100,7 +100,7 @@ def mug(shop: Workshop, colour: Colour) -> Prop:
         ),
         box((radius - 0.005, -0.008, 0.025), (radius + 0.025, 0.008, height - 0.02), tile),
     ]
-    return Prop("mug", join(parts), lambda: mug(shop, shop.near(colour)))
+    return Prop("mug", join(parts), lambda: mug(shop, shop.near(colour)), tips=True)
 
 
 def carton(shop: Workshop, size: tuple[float, float, float], board: Colour, ink: Colour) -> Prop:
@@ -114,7 +114,7 @@ def carton(shop: Workshop, size: tuple[float, float, float], board: Colour, ink:
         w, d, h = shop.similar(size)
         return carton(shop, (w, d, h), shop.near(board, 5), shop.near(ink, 25))
 
-    return Prop("carton", mesh, lookalike)
+    return Prop("carton", mesh, lookalike, tips=True)
 
 
 def books(shop: Workshop, count: int) -> Prop:
@@ -188,7 +188,7 @@ def bin_(shop: Workshop, colour: Colour) -> Prop:
         [radius * 0.75, 0.02],
         [0, 0.02],
     ]
-    return Prop("bin", lathe(profile, tile, 0.5), lambda: bin_(shop, shop.near(colour)))
+    return Prop("bin", lathe(profile, tile, 0.5), lambda: bin_(shop, shop.near(colour)), 0, True, True)
 
 
 def bag(shop: Workshop, colour: Colour) -> Prop:
@@ -198,7 +198,7 @@ def bag(shop: Workshop, colour: Colour) -> Prop:
     profile: Outline = [[0, 0], [0.15, 0.01], [0.17, 0.12], [0.16, 0.3], [0.1, 0.41], [0, 0.44]]
     body = lathe(profile, tile, 0.4, 16, smooth=True)
     front = box((-0.1, -0.2, 0.05), (0.1, -0.1, 0.24), [tile, tile, pocket, tile, tile, tile], None)
-    return Prop("bag", join([body, front]), lambda: bag(shop, shop.near(colour)))
+    return Prop("bag", join([body, front]), lambda: bag(shop, shop.near(colour)), tips=True)
 
 
 def bookcase(

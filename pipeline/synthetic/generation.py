@@ -26,7 +26,14 @@ from pipeline.synthetic.atlas import TextureAtlas
 from pipeline.synthetic.props import Workshop
 from pipeline.synthetic.render import Renderer
 from pipeline.synthetic.sensor import expose, measure, misplace
-from pipeline.synthetic.truth import SeenPoints, TruthSettings, assemble, label_points, observed
+from pipeline.synthetic.truth import (
+    SeenPoints,
+    TruthSettings,
+    assemble,
+    label_points,
+    motions,
+    observed,
+)
 from pipeline.synthetic.world import SensorSettings, SyntheticScene
 
 SCENES = ("office", "carpark", "warehouse", "market")
@@ -47,10 +54,10 @@ def generate(
     sensor: SensorSettings | None = None,
     workers: int | None = None,
 ) -> None:
-    """Write two visits of a synthetic scene: ``OUT/s0``, ``OUT/s1``, ``OUT/gt.ply``, ``OUT/scene.json``.
+    """Write two visits of a synthetic scene: ``OUT/s0``, ``OUT/s1``, ``OUT/gt.ply``, ``OUT/gt.json``.
 
-    The same arguments give the same bytes. ``scene.json`` is for people and tests; nothing that
-    processes the visits may need it.
+    The same arguments give the same bytes. ``gt.json`` holds the true motions (see ``truth.motions``).
+    ``OUT/scene.json`` is for people and tests; nothing that processes the visits may need it.
 
     Args:
         scene: one of ``SCENES``.
@@ -153,6 +160,7 @@ def record(
         scene, list(_in_order(lambda v: clouds[v].points(), 2, workers)), renderers, sensor, workers
     )
     write_ply(folder / "gt.ply", truth)
+    (folder / "gt.json").write_text(json.dumps(motions(scene, truth), indent=1) + "\n")
     (folder / "scene.json").write_text(json.dumps(describe(scene, truth), indent=1) + "\n")
     return truth
 
@@ -217,6 +225,8 @@ def describe(scene: SyntheticScene, truth: LabelledPoints) -> dict[str, Any]:
                 "object_id": thing.object_id,
                 "class": thing.class_name,
                 "fate": thing.fate,
+                "story": thing.story,
+                "symmetry_order": thing.symmetry_order,
                 "replaced_by": thing.replaced_by,
                 "T_world_object": [
                     None if pose is None else np.round(pose, 6).tolist() for pose in thing.poses

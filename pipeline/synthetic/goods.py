@@ -36,7 +36,7 @@ def pallet(shop: Workshop, wood: Colour = (178, 142, 96)) -> Prop:
     parts += [
         box((x - 0.06, -0.4, 0.1), (x + 0.06, 0.4, 0.13), tile, 0.6, x) for x in np.linspace(-0.54, 0.54, 7)
     ]
-    return Prop("pallet", join(parts), lambda: pallet(shop, wood))
+    return Prop("pallet", join(parts), lambda: pallet(shop, wood), 2, plain=True)
 
 
 def drum(shop: Workshop, colour: Colour, radius: float = 0.29, height: float = 0.88) -> Prop:
@@ -60,9 +60,8 @@ def drum(shop: Workshop, colour: Colour, radius: float = 0.29, height: float = 0
     ]
     profile += [[r, h * 0.64], [rib, h * 0.66], [r, h * 0.68], [r, h - 0.04], [rib, h - 0.02], [rib, h]]
     profile += [[r * 0.95, h], [r * 0.95, h - 0.02], [0, h - 0.02]]
-    return Prop(
-        "drum", lathe(profile, tile, None, 24), lambda: drum(shop, shop.near(colour, 8), radius, height)
-    )
+    mesh = lathe(profile, tile, None, 24)
+    return Prop("drum", mesh, lambda: drum(shop, shop.near(colour, 8), radius, height), tips=True)
 
 
 def crate(shop: Workshop, size: tuple[float, float, float], colour: Colour) -> Prop:
@@ -87,7 +86,7 @@ def crate(shop: Workshop, size: tuple[float, float, float], colour: Colour) -> P
         w, d, h = shop.similar(size)
         return crate(shop, (w, d, h), shop.near(colour, 8))
 
-    return Prop("crate", join(parts), lookalike)
+    return Prop("crate", join(parts), lookalike, 2)
 
 
 def cone(shop: Workshop) -> Prop:
@@ -100,7 +99,7 @@ def cone(shop: Workshop) -> Prop:
         cylinder(0.09, 0.13, white, 0.4, top=0.065).at(z=0.31),
         cylinder(0.065, 0.2, tile, 0.4, top=0.02).at(z=0.44),
     ]
-    return Prop("cone", join(parts), lambda: cone(shop))
+    return Prop("cone", join(parts), lambda: cone(shop), 4, True, True)
 
 
 def pallet_truck(shop: Workshop, colour: Colour) -> Prop:
@@ -110,4 +109,4 @@ def pallet_truck(shop: Workshop, colour: Colour) -> Prop:
     parts.append(box((0.5, -0.28, 0.05), (0.7, 0.28, 0.45), tile, 0.5))
     parts.append(box((-0.025, -0.025, 0), (0.025, 0.025, 1.0), dark).at(0.66, 0, 0.35, 0.35, "y"))
     parts.append(cylinder(0.09, 0.12, dark).at(0.66, 0.06, 0.09, np.pi / 2, "x"))
-    return Prop("pallet truck", join(parts), lambda: pallet_truck(shop, shop.near(colour)))
+    return Prop("pallet truck", join(parts), lambda: pallet_truck(shop, shop.near(colour)), plain=True)

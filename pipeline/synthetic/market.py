@@ -7,9 +7,11 @@ import numpy as np
 from pipeline.camera import PinholeCamera
 from pipeline.synthetic import furniture, goods, prints, street, textures
 from pipeline.synthetic.carpark import OUTDOOR_SENSOR
+from pipeline.synthetic.changes import Reach, Rearrangement, Spot, draw_mix
+from pipeline.synthetic.footprint import Area, Footprint, footprint
 from pipeline.synthetic.lighting import daylight
 from pipeline.synthetic.paths import walk
-from pipeline.synthetic.props import Arrangement, Prop, Workshop, fates, nudge, scatter
+from pipeline.synthetic.props import Arrangement, Prop, Workshop, scatter
 from pipeline.synthetic.shapes import Mesh, box, join, pose
 from pipeline.synthetic.world import SyntheticScene
 
@@ -37,7 +39,7 @@ def square(shop: Workshop, width: float, depth: float) -> Mesh:
 
 def market_thing(shop: Workshop, colours: list) -> Prop:
     """Something that comes and goes with a market."""
-    match int(shop.rng.integers(7)):
+    match int(shop.rng.integers(9)):
         case 0 | 1:
             ground = (shop.between(2.3, 3.2), shop.between(2.2, 2.8))
             pair = [colours[int(i)] for i in shop.rng.choice(len(colours), 2, replace=False)]
@@ -47,6 +49,10 @@ def market_thing(shop: Workshop, colours: list) -> Prop:
         case 4:
             return street.parasol(shop, shop.between(1.1, 1.6))
         case 5:
+            return street.wheelie_bin(shop, prints.vivid(shop.rng, 40, 130))
+        case 6:
+            return street.trolley(shop, prints.vivid(shop.rng, 60, 200))
+        case 7:
             size = (shop.between(0.6, 1.0), shop.between(0.5, 0.8), shop.between(0.5, 1.0))
             return goods.crate(shop, size, shop.near((160, 120, 78), 24))
         case _:
@@ -75,29 +81,26 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
     room = {"tree": 0.55, "tent": 0.86, "stall": 0.9}
     radii = [thing.radius * room.get(thing.class_name, 1.0) for thing in everything]
     places = scatter(rng, (-inner[0], -inner[1]), inner, radii, 0.15, 800)
-    spots: list[tuple[np.ndarray, Prop]] = []
+    spots: list[Spot] = []
+    obstacles: list[Footprint] = []
+    floor = Area(np.eye(4), *inner)
     for thing, place in zip(everything, places, strict=True):
         if place is None:
             continue
         T = pose(place[0], place[1], 0, rng.integers(4) * np.pi / 2 + rng.normal(0, 0.2))
         if any(thing is kept for kept in lasting):
             plan.keep(thing, T)
+            obstacles.append(footprint(thing.mesh, T, 0.5 if thing.class_name == "tree" else 1.0))
         else:
-            spots.append((T, thing))
+            spots.append(Spot(T, thing, floor, "square"))
     arriving = rng.random() < 0.5
-    shares = {"appeared": 0.28, "disappeared": 0.05} if arriving else {"appeared": 0.05, "disappeared": 0.28}
-    dealt = fates(rng, len(spots), moved=0.31, spare=0.25, replaced=0.09, **shares)
-    free = [(T, thing.radius) for (T, thing), fate in zip(spots, dealt, strict=True) if fate == "spare"]
-    for (T, thing), fate in zip(spots, dealt, strict=True):
-        if fate == "spare":
-            continue
-        goal = None
-        if fate == "moved":
-            fits = [i for i, (_, radius) in enumerate(free) if radius > thing.radius * 0.75]
-            # The tightest place that fits: large ones stay free for what is large.
-            goal = free.pop(min(fits, key=lambda i: free[i][1]))[0] if fits else None
-        plan.deal(fate, thing, T, goal, nudge(rng, 0.05, 0.03))
+    shares = (0.28, 0.05, 0.12) if arriving else (0.05, 0.28, 0.12)
+    mix = draw_mix(shop, len(spots), seed % 3 == 0, shares, spare=0.5, jolted=shop.count(0, 2))
+    # Crowns and awnings overhang their neighbours: boxes around things are taken a little smaller.
+    reach = Reach(shift_m=(0.15, 0.6), nudge_m=0.05, footprint_scale=0.9)
+    Rearrangement(shop, spots, lambda _: market_thing(shop, colours), obstacles, reach).deal(mix, plan)
 
+    partial = shop.count(0, 1)
     return SyntheticScene(
         name="market",
         seed=seed,
@@ -105,26 +108,29 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
         background=square(shop, width, depth),
         objects=plan.objects(rng),
         lighting=(daylight(shop), daylight(shop)),
-        paths=(_round(shop, 0, width, depth, frames), _round(shop, 1, width, depth, frames)),
+        paths=(
+            _round(shop, partial == 0, width, depth, frames),
+            _round(shop, partial == 1, width, depth, frames),
+        ),
         camera=camera,
         sensor=OUTDOOR_SENSOR,
         truth_voxel_m=0.05,
     )
 
 
-def _round(shop: Workshop, visit: int, width: float, depth: float, frames: int) -> np.ndarray:
-    """Round the square near the houses, looking across it."""
+def _round(shop: Workshop, partial: bool, width: float, depth: float, frames: int) -> np.ndarray:
+    """Round the square near the houses, looking across it; a partial one leaves a side out."""
     rng = shop.rng
-    laps = 1.0 if visit == 0 else shop.between(0.78, 0.92)
+    laps = shop.between(0.42, 0.62) if partial else shop.between(0.95, 1.05)
     start, turn = shop.between(0, 2 * np.pi), rng.choice([-1.0, 1.0])
     angle = start + turn * np.linspace(0, 2 * np.pi * laps, 17)
-    margin, height = shop.between(2.4, 3.4), shop.between(1.7, 2.4)
+    margin, height = shop.between(2.2, 3.8), shop.between(1.6, 2.6)
     # A rounded rectangle: a circle pushed outwards.
     unit = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     unit /= (np.abs(unit) ** 4).sum(1, keepdims=True) ** 0.25
     positions = np.concatenate(
         [unit * [width / 2 - margin, depth / 2 - margin], height + rng.normal(0, 0.08, (17, 1))], axis=1
     )
-    ahead = angle + np.pi - turn * shop.between(0.2, 0.7)
+    ahead = angle + np.pi - turn * shop.between(-0.3, 0.8)
     targets = np.stack([np.cos(ahead) * width * 0.12, np.sin(ahead) * depth * 0.12, np.full(17, 0.9)], axis=1)
     return walk(positions, targets, frames, rng, 0.04)

@@ -6,9 +6,11 @@ import numpy as np
 
 from pipeline.camera import PinholeCamera
 from pipeline.synthetic import furniture, prints, textures
+from pipeline.synthetic.changes import Rearrangement, Spot, draw_mix
+from pipeline.synthetic.footprint import Area, footprint, is_free
 from pipeline.synthetic.lighting import room_lighting
 from pipeline.synthetic.paths import walk
-from pipeline.synthetic.props import Arrangement, Prop, Workshop, fates, nudge, scatter
+from pipeline.synthetic.props import Arrangement, Prop, Workshop, scatter
 from pipeline.synthetic.shapes import Mesh, box, join, pose
 from pipeline.synthetic.world import SensorSettings, SyntheticScene
 
@@ -99,17 +101,15 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
     background = room(shop, width, depth, height)
     plan = Arrangement()
     wood = shop.near((170, 130, 90), 25)
-
     # Furniture along the walls, side by side; wall 0 is +y, the others follow clockwise.
-    surfaces: list[tuple[np.ndarray, float, float]] = []  # T_world_surface, width, depth
+    spots: list[Spot] = []
     for wall in range(4):
         length, distance = (width, depth / 2) if wall % 2 == 0 else (depth, width / 2)
-        turn = -wall * np.pi / 2
         x = -length / 2 + (0.15 if wall % 2 == 0 else 1.0)
         end = length / 2 - (0.15 if wall % 2 == 0 else 1.0)
+        T_wall = pose(0, 0, 0, -wall * np.pi / 2)
         while end - x > 0.9:
             kind = rng.choice(["desk", "desk", "bookcase", "cabinet"])
-            T_wall = pose(0, 0, 0, turn)
             if kind == "desk" and end - x > 1.5:
                 w, d, h = (
                     shop.between(1.3, min(1.7, end - x)),
@@ -118,15 +118,7 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
                 )
                 T = T_wall @ pose(x + w / 2, distance - d / 2 - 0.03, 0)
                 plan.keep(furniture.desk(shop, (w, d, h), shop.near(wood, 10)), T)
-                back = distance - d / 2 - 0.03
-                T_screen = T_wall @ pose(
-                    x + w / 2 + shop.between(-0.15, 0.15), back + 0.15, h, rng.normal(0, 0.1)
-                )
-                screen = furniture.monitor(shop, shop.between(0.48, 0.62))
-                fate = rng.choice(["static", "static", "static", "disappeared", "appeared", "replaced"])
-                plan.deal(str(fate), screen, T_screen)
-                surfaces.append((T_wall @ pose(x + w * 0.16, back, h), w * 0.3, d))
-                surfaces.append((T_wall @ pose(x + w * 0.84, back, h), w * 0.3, d))
+                spots += _desk_spots(shop, Area(T @ pose(0, 0, h), w / 2, d / 2), shop.count(2, 4), True)
             elif kind == "bookcase":
                 w, d, h = (
                     shop.between(0.8, min(1.2, end - x)),
@@ -137,50 +129,45 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
                 T = T_wall @ pose(x + w / 2, distance - d / 2 - 0.02, 0)
                 plan.keep(case, T)
                 for level in levels:
+                    area = Area(T @ pose(0, 0, level), w / 2 - 0.02, d / 2)
                     for side in (-0.25, 0.25):
-                        surfaces.append((T @ pose(side * (w - 0.06), -0.01, level), (w - 0.08) / 2, -d))
+                        row = furniture.books(shop, max(3, int((w - 0.08) / 2 / 0.045)))
+                        T_row = T @ pose(side * (w - 0.06), -0.01, level)
+                        spots.append(Spot(T_row, row, area, "shelf", weight=0.35))
             else:
                 w, d, h = shop.between(0.7, min(1.1, end - x)), shop.between(0.4, 0.5), shop.between(0.7, 1.1)
                 T = T_wall @ pose(x + w / 2, distance - d / 2 - 0.02, 0)
                 plan.keep(furniture.cabinet(shop, (w, d, h), shop.near((170, 170, 165), 30)), T)
-                surfaces.append((T @ pose(0, 0, h), w - 0.06, d - 0.04))
+                spots += _desk_spots(shop, Area(T @ pose(0, 0, h), w / 2, d / 2), shop.count(1, 2), False)
             x += w + shop.between(0.1, 0.6)
     # A table in the middle.
     w, d, h = shop.between(1.2, 1.8), shop.between(0.8, 1.0), 0.73
     middle = pose(rng.normal(0, 0.2), rng.normal(0, 0.2), 0, shop.between(-0.3, 0.3))
-    plan.keep(furniture.desk(shop, (w, d, h), shop.near(wood, 25)), middle)
-    for side in (-0.33, 0, 0.33):
-        surfaces.append((middle @ pose(side * w, 0, h), w * 0.3, d * 0.9))
-
-    # Small things: one spot each; a third of the spots stays free for what is moved.
-    spots = []
-    for T_surface, spot_width, spot_depth in surfaces:
-        is_shelf = spot_depth < 0
-        thing = furniture.books(shop, max(3, int(spot_width / 0.045))) if is_shelf else small_thing(shop)
-        room_x = max(spot_width / 2 - thing.radius, 0)
-        room_y = 0 if is_shelf else max(spot_depth / 2 - thing.radius, 0)
-        yaw = 0.0 if is_shelf else rng.normal(0, 0.35)
-        T = T_surface @ pose(
-            shop.between(-room_x, room_x + 1e-9), shop.between(-room_y, room_y + 1e-9), 0, yaw
-        )
-        spots.append((T, thing, is_shelf))
-    _deal_spots(plan, rng, [s for s in spots if not s[2]], moved=shop.between(0.1, 0.24))
-    _deal_spots(plan, rng, [s for s in spots if s[2]], moved=0.08)
+    table = furniture.desk(shop, (w, d, h), shop.near(wood, 25))
+    plan.keep(table, middle)
+    spots += _desk_spots(shop, Area(middle @ pose(0, 0, h), w / 2, d / 2), shop.count(3, 5), False)
 
     # On the floor, inside the ring of furniture.
     things = [floor_thing(shop) for _ in range(shop.count(9, 13))]
     inner = (width / 2 - 1.05, depth / 2 - 1.05)
-    table = (float(middle[0, 3]), float(middle[1, 3]), float(np.hypot(w, d)) / 2 * 0.85)
+    taken = (float(middle[0, 3]), float(middle[1, 3]), float(np.hypot(w, d)) / 2 * 0.85)
     radii = [thing.radius for thing in things]
-    places = scatter(rng, (-inner[0], -inner[1]), inner, radii, 0.06, 200, taken=[table])
-    standing = [
-        (pose(place[0], place[1], 0, shop.between(-np.pi, np.pi)), thing, False)
+    places = scatter(rng, (-inner[0], -inner[1]), inner, radii, 0.06, 200, taken=[taken])
+    floor = Area(np.eye(4), *inner)
+    spots += [
+        Spot(pose(place[0], place[1], 0, shop.between(-np.pi, np.pi)), thing, floor, "floor")
         for thing, place in zip(things, places, strict=True)
         if place is not None
     ]
-    _deal_spots(plan, rng, standing, moved=0.2)
 
-    paths = tuple(_round(shop, visit, width, depth, frames) for visit in (0, 1))
+    def substitute(spot: Spot) -> Prop:
+        return floor_thing(shop) if spot.group == "floor" else small_thing(shop)
+
+    mix = draw_mix(shop, len(spots), seed % 3 == 0, (0.07, 0.07, 0.12), spare=0.5, jolted=shop.count(0, 3))
+    Rearrangement(shop, spots, substitute, [footprint(table.mesh, middle)]).deal(mix, plan)
+
+    partial = shop.count(0, 1)
+    paths = tuple(_round(shop, visit == partial, width, depth, frames) for visit in (0, 1))
     return SyntheticScene(
         name="office",
         seed=seed,
@@ -195,37 +182,56 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
     )
 
 
-def _deal_spots(
-    plan: Arrangement, rng: np.random.Generator, spots: list[tuple[np.ndarray, Prop, bool]], moved: float
-) -> None:
-    """Give each spot's thing a fate; a moved thing takes over a spot whose own thing is left out."""
-    dealt = fates(rng, len(spots), moved=moved, spare=moved, disappeared=0.09, appeared=0.09, replaced=0.12)
-    free = [spot[0] for spot, fate in zip(spots, dealt, strict=True) if fate == "spare"]
-    for (T, thing, _), fate in zip(spots, dealt, strict=True):
-        if fate == "spare":
-            continue
-        goal = free.pop() if fate == "moved" and free else None
-        plan.deal(fate, thing, T, goal, nudge(rng, 0.006, 0.03))
+def _desk_spots(shop: Workshop, top: Area, count: int, screen: bool) -> list[Spot]:
+    """Things on a table, and maybe a screen at its back, each with room of its own."""
+    spots: list[Spot] = []
+    if screen:
+        shown = furniture.monitor(shop, shop.between(0.48, 0.62))
+        at = shop.between(-0.15, 0.15), top.half_depth_m - 0.15
+        T = top.T_world_area @ pose(at[0], at[1], 0, float(shop.rng.normal(0, 0.1)))
+        spots.append(Spot(T, shown, top, "screen"))
+    for _ in range(count):
+        thing = small_thing(shop)
+        for _ in range(30):
+            x, y = (shop.between(-half, half) for half in (top.half_width_m, top.half_depth_m))
+            T = top.T_world_area @ pose(x, y, 0, float(shop.rng.normal(0, 0.35)))
+            box = footprint(thing.mesh, T)
+            others = [footprint(spot.prop.mesh, spot.pose) for spot in spots]
+            if top.contains(box) and is_free(box, others, 0.0):
+                spots.append(Spot(T, thing, top, "desk"))
+                break
+    return spots
 
 
-def _round(shop: Workshop, visit: int, width: float, depth: float, frames: int) -> np.ndarray:
-    """A walk round the middle of the room, looking across it at the opposite wall."""
+def _round(shop: Workshop, partial: bool, width: float, depth: float, frames: int) -> np.ndarray:
+    """A walk round the middle of the room, looking across it or outwards; a partial one leaves a part out."""
     rng = shop.rng
-    laps = 1.0 if visit == 0 else shop.between(0.82, 0.95)
+    outward = rng.random() < 0.25
+    laps = shop.between(1.0, 1.15)
+    if partial:
+        laps = shop.between(0.7, 0.85) if outward else shop.between(0.6, 0.8)
+    # Two smaller rounds one above the other now and then.
+    rounds = 2 if rng.random() < 0.25 and not partial else 1
+    waypoints = 12 * rounds + 1
     start, turn = shop.between(0, 2 * np.pi), rng.choice([-1.0, 1.0])
-    angle = start + turn * np.linspace(0, 2 * np.pi * laps, 13)
-    reach = shop.between(0.2, 0.27)
-    height = shop.between(1.5, 1.75)
+    angle = start + turn * np.linspace(0, 2 * np.pi * laps * rounds, waypoints)
+    reach = shop.between(0.05, 0.12) if outward else shop.between(0.17, 0.28)
+    low, high = shop.between(1.25, 1.55), shop.between(1.55, 1.85)
+    height = np.linspace(low, high, waypoints) if rounds == 2 else np.full(waypoints, shop.between(low, high))
     positions = np.stack(
-        [np.cos(angle) * width * reach, np.sin(angle) * depth * reach, height + rng.normal(0, 0.06, 13)],
+        [
+            np.cos(angle) * width * reach,
+            np.sin(angle) * depth * reach,
+            height + rng.normal(0, 0.06, waypoints),
+        ],
         axis=1,
     )
-    ahead = angle + np.pi + turn * shop.between(-0.35, 0.35)
+    ahead = angle + (0.0 if outward else np.pi) + turn * shop.between(-0.35, 0.35)
     targets = np.stack(
         [
             np.cos(ahead) * width * 0.42,
             np.sin(ahead) * depth * 0.42,
-            shop.between(0.5, 0.75) + rng.normal(0, 0.1, 13),
+            shop.between(0.45, 0.75) + rng.normal(0, 0.1, waypoints),
         ],
         axis=1,
     )

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from pipeline.synthetic.atlas import TextureAtlas
-from pipeline.synthetic.shapes import Mesh, pose
+from pipeline.synthetic.shapes import Mesh
 from pipeline.synthetic.textures import Colour, Tile, mottled
 from pipeline.synthetic.world import Pose, SceneObject
 
@@ -21,11 +21,17 @@ class Prop:
         class_name: for people.
         mesh: standing on z = 0 around the z axis.
         lookalike: makes another of the same family: similar shape and colour, its own texture.
+        symmetry_order: of shape and print about the z axis: 1 = none, n = n-fold, 0 = any angle.
+        tips: whether it may be found lying on its side.
+        plain: whether nothing tells it from its look-alikes.
     """
 
     class_name: str
     mesh: Mesh
     lookalike: Callable[[], Prop]
+    symmetry_order: int = 1
+    tips: bool = False
+    plain: bool = False
 
     @property
     def height(self) -> float:
@@ -36,6 +42,15 @@ class Prop:
     def radius(self) -> float:
         """Metres from its axis to its farthest corner, seen from above."""
         return float(np.hypot(*np.abs(self.mesh.bounds[:, :2]).max(0)))
+
+
+def reprinted(prop: Prop) -> Prop:
+    """A thing of the very same shape with other textures; a look-alike where its family varies too much."""
+    other = prop.lookalike()
+    if len(other.mesh.tile) != len(prop.mesh.tile):
+        return other
+    mesh = Mesh(prop.mesh.corners, prop.mesh.normals, other.mesh.uv, other.mesh.tile)
+    return replace(prop, mesh=mesh, lookalike=other.lookalike)
 
 
 @dataclass(frozen=True)
@@ -71,56 +86,45 @@ class Workshop:
         return [float(size * np.clip(self.rng.normal(1, spread), 0.9, 1.1)) for size in sizes]
 
 
+@dataclass(frozen=True)
+class Entry:
+    """A thing with its poses in both visits, the entry that took its place, and how that came about."""
+
+    prop: Prop
+    previous: Pose | None
+    current: Pose | None
+    successor: int | None = None
+    story: str = ""
+
+
 @dataclass
 class Arrangement:
     """Collects what stands where in each visit; ids are dealt at the end so that they tell nothing."""
 
-    entries: list[tuple[Prop, Pose | None, Pose | None, int | None]] = field(default_factory=list)
+    entries: list[Entry] = field(default_factory=list)
 
     def keep(self, prop: Prop, pose: Pose) -> None:
         """The same thing at the same place in both visits."""
-        self.entries.append((prop, pose, pose, None))
+        self.entries.append(Entry(prop, pose, pose))
 
     def vanish(self, prop: Prop, pose: Pose) -> None:
         """There in the previous visit only."""
-        self.entries.append((prop, pose, None, None))
+        self.entries.append(Entry(prop, pose, None))
 
     def arrive(self, prop: Prop, pose: Pose) -> None:
         """There in the current visit only."""
-        self.entries.append((prop, None, pose, None))
+        self.entries.append(Entry(prop, None, pose))
 
-    def move(self, prop: Prop, before: Pose, after: Pose) -> None:
-        """Carried from one place to another."""
-        self.entries.append((prop, before, after, None))
+    def move(self, prop: Prop, before: Pose, after: Pose, story: str = "carried") -> None:
+        """Brought from one pose to another."""
+        self.entries.append(Entry(prop, before, after, story=story))
 
-    def replace(self, prop: Prop, pose: Pose, successor: Prop, successor_pose: Pose) -> None:
-        """Taken away, and another thing put in its place."""
-        self.entries.append((prop, pose, None, len(self.entries) + 1))
-        self.entries.append((successor, None, successor_pose, None))
-
-    def deal(
-        self, fate: str, prop: Prop, pose: Pose, spare: Pose | None = None, jitter: Pose | None = None
+    def replace(
+        self, prop: Prop, pose: Pose, successor: Prop, successor_pose: Pose, story: str = "look-alike"
     ) -> None:
-        """Enter a prop by the name of its fate.
-
-        Args:
-            fate: static, disappeared, appeared, moved (to ``spare``) or replaced.
-            prop: the thing.
-            pose: where it stands.
-            spare: where a moved thing goes; without one it stays.
-            jitter: small change of pose (4, 4) of a successor relative to what it replaces.
-        """
-        if fate == "moved" and spare is not None:
-            before, after = pose, spare
-            self.move(prop, before, after)
-        elif fate == "disappeared":
-            self.vanish(prop, pose)
-        elif fate == "appeared":
-            self.arrive(prop, pose)
-        elif fate == "replaced":
-            self.replace(prop, pose, prop.lookalike(), pose if jitter is None else pose @ jitter)
-        else:
-            self.keep(prop, pose)
+        """Taken away, and another thing put in its place."""
+        self.entries.append(Entry(prop, pose, None, len(self.entries) + 1, story))
+        self.entries.append(Entry(successor, None, successor_pose, story=story))
 
     def objects(self, rng: np.random.Generator) -> tuple[SceneObject, ...]:
         """All objects in the order of their shuffled ids."""
@@ -128,27 +132,16 @@ class Arrangement:
         made = [
             SceneObject(
                 object_id=int(number),
-                class_name=prop.class_name,
-                mesh=prop.mesh,
-                poses=(before, after),
-                replaced_by=None if successor is None else int(ids[successor]),
+                class_name=entry.prop.class_name,
+                mesh=entry.prop.mesh,
+                poses=(entry.previous, entry.current),
+                replaced_by=None if entry.successor is None else int(ids[entry.successor]),
+                symmetry_order=entry.prop.symmetry_order,
+                story=entry.story,
             )
-            for number, (prop, before, after, successor) in zip(ids, self.entries, strict=True)
+            for number, entry in zip(ids, self.entries, strict=True)
         ]
         return tuple(sorted(made, key=lambda thing: thing.object_id))
-
-
-def fates(rng: np.random.Generator, count: int, **shares: float) -> list[str]:
-    """Shuffled fates of ``count`` things; shares are met to whole numbers, the rest is static."""
-    dealt = [name for name, share in shares.items() for _ in range(round(share * count))][:count]
-    dealt += ["static"] * (count - len(dealt))
-    return [dealt[i] for i in rng.permutation(count)]
-
-
-def nudge(rng: np.random.Generator, shift_m: float, turn_rad: float) -> Pose:
-    """How much what is put in a thing's place stands off it: shift and turn of these deviations, (4, 4)."""
-    dx, dy = rng.normal(0, shift_m, 2)
-    return pose(float(dx), float(dy), 0, float(rng.normal(0, turn_rad)))
 
 
 def scatter(

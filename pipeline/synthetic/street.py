@@ -76,7 +76,7 @@ def tent(shop: Workshop, size: tuple[float, float], colours: list[Colour]) -> Pr
     if shop.rng.random() < 0.6:
         banner = shop.tile(prints.picture(shop.rng))
         side = shop.tile(textures.cloth(shop.rng, colours, shop.count(0, 6)))
-        parts.append(box((-half_w, half_d - 0.03, 0.1), (half_w, half_d, eave), side, 1.5))
+        parts.append(box((-half_w, half_d - 0.03, 0.1), (half_w, half_d - 0.005, eave), side, 1.5))
         parts.append(
             box((-half_w * 0.6, half_d - 0.06, 0.9), (half_w * 0.6, half_d - 0.03, 1.9), banner, None)
         )
@@ -122,7 +122,7 @@ def parasol(shop: Workshop, radius: float) -> Prop:
         cylinder(0.5, 0.04, top, 0.8).at(z=0.7),
         cylinder(0.25, 0.05, pole, 0.4),
     ]
-    return Prop("parasol", join(parts), lambda: parasol(shop, radius))
+    return Prop("parasol", join(parts), lambda: parasol(shop, radius), 4)
 
 
 def fountain(shop: Workshop, radius: float) -> Prop:
@@ -184,3 +184,35 @@ def facade_row(shop: Workshop, length: float, height: float) -> Mesh:
         parts.append(box((at - 0.6, setback - 0.25, 2.4), (at + 1.7, setback, 3.0), sign, None))
         x += width
     return join(parts)
+
+
+def wheelie_bin(shop: Workshop, colour: Colour) -> Prop:
+    """A household waste container with a lid, a label and two wheels."""
+    face = textures.mottled(shop.rng, colour, 0.1, 1.3)
+    prints.rectangle(face, (60, 70), (190, 150), prints.vivid(shop.rng, 120, 240))
+    prints.write(face, prints.word(shop.rng, 3), (72, 128), 1.6, (240, 240, 235), 3)
+    plain, front = shop.paint(colour, 0.12), shop.tile(face)
+    dark = shop.paint((36, 36, 38), 0.15)
+    body = box((-0.29, -0.34, 0.06), (0.29, 0.34, 0.98), [plain, plain, front, plain, plain, plain], None)
+    parts = [body, box((-0.31, -0.38, 0.98), (0.31, 0.37, 1.07), plain, 0.6)]
+    parts += [cylinder(0.1, 0.06, dark, 0.3).at(x, 0.3, 0.1, np.pi / 2, "y") for x in (-0.33, 0.27)]
+    return Prop("wheelie bin", join(parts), lambda: wheelie_bin(shop, shop.near(colour, 8)), tips=True)
+
+
+def trolley(shop: Workshop, colour: Colour) -> Prop:
+    """A shopping trolley, its front towards +x: a frame, a basket of panels with bars, a printed handle."""
+    bars = shop.tile(textures.cloth(shop.rng, [shop.near((176, 178, 182), 10), (70, 72, 76)], 16, 128), 0.1)
+    steel, handle = shop.paint((150, 152, 156), 0.15, 0.1), shop.tile(prints.picture(shop.rng, 64))
+    grip = shop.paint(colour, 0.15)
+    outline = [(-0.35, 0.62), (0.4, 0.55), (0.45, 0.98), (-0.45, 1.0)]
+    parts = [
+        prism(outline, 0.52, bars, 0.5),
+        box((-0.55, -0.27, 0.98), (-0.49, 0.27, 1.05), grip, 0.3),
+        box((-0.5, -0.18, 0.84), (-0.46, 0.18, 0.97), handle, None),
+    ]
+    for y in (-0.24, 0.22):
+        parts.append(box((-0.45, y, 0.1), (0.42, y + 0.03, 0.14), steel, 0.4))
+        parts.append(box((-0.42, y, 0.12), (-0.38, y + 0.03, 0.66), steel, 0.4))
+        for x in (-0.42, 0.38):
+            parts.append(cylinder(0.06, 0.03, grip, 0.2, segments=10).at(x, y + 0.03, 0.06, np.pi / 2, "x"))
+    return Prop("trolley", join(parts), lambda: trolley(shop, shop.near(colour)), plain=True)

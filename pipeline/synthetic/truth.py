@@ -1,13 +1,14 @@
 """Ground truth: what the cameras of each visit truly saw, labelled with what could be known from both.
 
-Seen but elsewhere is ``moved``; a place that the other visit never looked at is not scored (255).
-Occluded is not observed.
+Seen in both visits but elsewhere, or turned, is ``moved`` (by more than 5 cm or 10 degrees, see ``motion``);
+a place that the other visit never looked at is not scored (255). Occluded is not observed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,8 @@ from numpy.typing import NDArray
 from pipeline.camera import PinholeCamera, invert_rigid, transform_points
 from pipeline.ply import NOT_SCORED, LabelledPoints
 from pipeline.result import ChangeLabel
+from pipeline.synthetic.motion import T_world_motion
+from pipeline.synthetic.world import SyntheticScene
 
 # (camera centre in the world, points in the world) -> distance of the first hit over that of the point,
 # and the object hit; see Renderer.first_hit.
@@ -185,3 +188,28 @@ def assemble(
         object_id=np.concatenate(object_id),
         confidence=np.ones(len(label), dtype=np.float32),
     )
+
+
+def motions(scene: SyntheticScene, truth: LabelledPoints) -> dict[str, Any]:
+    """What ``gt.json`` holds: how each object labelled moved got from one place to the other.
+
+    Returns:
+        ``schema_version`` 1; ``motions``: of each, ``object_id``, ``T_world_motion`` (4x4, rows, metres; a
+        point of the object in the world goes from p in the previous visit to T p in the current one) and
+        ``symmetry_order`` (1 = none, n = n-fold about the object's up axis, 0 = any angle); ``kinds``: how
+        each changed object changed, by object id (see ``changes``).
+    """
+    moved = set(truth.object_id[truth.label == ChangeLabel.MOVED].tolist())
+    return {
+        "schema_version": 1,
+        "motions": [
+            {
+                "object_id": thing.object_id,
+                "T_world_motion": np.round(T_world_motion(thing), 9).tolist(),
+                "symmetry_order": thing.symmetry_order,
+            }
+            for thing in scene.objects
+            if thing.object_id in moved
+        ],
+        "kinds": {str(thing.object_id): thing.story or thing.fate for thing in scene.objects},
+    }

@@ -6,9 +6,11 @@ import numpy as np
 
 from pipeline.camera import PinholeCamera
 from pipeline.synthetic import furniture, goods, prints, textures
+from pipeline.synthetic.changes import Rearrangement, Spot, draw_mix
+from pipeline.synthetic.footprint import Area
 from pipeline.synthetic.lighting import room_lighting
 from pipeline.synthetic.paths import walk
-from pipeline.synthetic.props import Arrangement, Prop, Workshop, fates, nudge, scatter
+from pipeline.synthetic.props import Arrangement, Prop, Workshop, scatter
 from pipeline.synthetic.shapes import Mesh, box, join, pose
 from pipeline.synthetic.world import SensorSettings, SyntheticScene
 
@@ -79,7 +81,7 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
         return furniture.carton(shop, (width, depth, tall), shop.near(board, 4), shop.near(ink, 10))
 
     drum_colour = prints.vivid(rng, 70, 180)
-    spots: list[tuple[np.ndarray, Prop]] = []
+    spots: list[Spot] = []
     for row, facing in ((-1, np.pi), (1, 0.0)):
         for number in range(bays):
             centre = pose(
@@ -97,36 +99,45 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
                         break
                     if rng.random() < 0.93:
                         yaw, y = rng.normal(0, 0.07), shop.between(-0.14, 0.06)
-                        spots.append((centre @ pose(x + half, y, z, yaw), thing))
+                        deck = Area(centre @ pose(0, 0, z), bay / 2 - 0.1, _RACK_DEPTH_M / 2)
+                        spots.append(Spot(centre @ pose(x + half, y, z, yaw), thing, deck, "rack"))
                     x += 2 * half + shop.between(0.05, 0.2)
-    _deal(plan, rng, spots, moved=shop.between(0.1, 0.15))
 
     # Pallets, stacks, drums and trucks on the floor at the end of the aisle.
-    floor_things: list[Prop] = []
-    for _ in range(shop.count(8, 11)):
+    def floor_thing() -> Prop:
         match int(rng.integers(5)):
             case 0:
-                floor_things.append(goods.pallet(shop))
+                return goods.pallet(shop)
             case 1:
-                floor_things.append(goods.drum(shop, drum_colour))
+                return goods.drum(shop, drum_colour)
             case 2:
-                floor_things.append(goods.cone(shop))
+                return goods.cone(shop)
             case 3:
-                floor_things.append(goods.pallet_truck(shop, prints.vivid(rng, 120, 220)))
+                return goods.pallet_truck(shop, prints.vivid(rng, 120, 220))
             case _:
                 size = (shop.between(0.6, 0.9), shop.between(0.6, 0.8), shop.between(0.5, 0.9))
                 board, ink = families[0][1:]
-                floor_things.append(furniture.carton(shop, size, shop.near(board, 6), shop.near(ink, 10)))
+                return furniture.carton(shop, size, shop.near(board, 6), shop.near(ink, 10))
+
+    floor_things = [floor_thing() for _ in range(shop.count(8, 11))]
     corner = (length / 2 + 0.3, low[1] + 0.2), (end - 0.2, high[1] - 0.2)
     radii = [thing.radius for thing in floor_things]
     places = scatter(rng, corner[0], corner[1], radii, 0.1, 300)
-    standing = [
-        (pose(place[0], place[1], 0, shop.between(-np.pi, np.pi)), thing)
+    (x0, y0), (x1, y1) = corner
+    floor = Area(pose((x0 + x1) / 2, (y0 + y1) / 2, 0), (x1 - x0) / 2, (y1 - y0) / 2)
+    spots += [
+        Spot(pose(place[0], place[1], 0, shop.between(-np.pi, np.pi)), thing, floor, "floor", weight=1.8)
         for place, thing in zip(places, floor_things, strict=True)
         if place is not None
     ]
-    _deal(plan, rng, standing, moved=0.24)
 
+    def substitute(spot: Spot) -> Prop:
+        return floor_thing() if spot.group == "floor" else good()
+
+    mix = draw_mix(shop, len(spots), seed % 3 == 1, (0.07, 0.07, 0.13), spare=0.7, jolted=shop.count(0, 4))
+    Rearrangement(shop, spots, substitute).deal(mix, plan)
+
+    partial = shop.count(0, 1)
     return SyntheticScene(
         name="warehouse",
         seed=seed,
@@ -137,44 +148,38 @@ def build(shop: Workshop, seed: int, frames: int, camera: PinholeCamera) -> Synt
             room_lighting(shop, length, 2 * side, height),
             room_lighting(shop, length, 2 * side, height),
         ),
-        paths=(_patrol(shop, 0, length, aisle, frames), _patrol(shop, 1, length, aisle, frames)),
+        paths=(
+            _patrol(shop, partial == 0, length, aisle, frames),
+            _patrol(shop, partial == 1, length, aisle, frames),
+        ),
         camera=camera,
         sensor=SensorSettings(max_range_m=9.0),
         truth_voxel_m=0.025,
     )
 
 
-def _deal(
-    plan: Arrangement, rng: np.random.Generator, spots: list[tuple[np.ndarray, Prop]], moved: float = 0.1
-) -> None:
-    """Give each spot's thing a fate; a moved thing takes over a spot whose own thing is left out."""
-    dealt = fates(rng, len(spots), moved=moved, spare=moved, disappeared=0.08, appeared=0.08, replaced=0.14)
-    free = [spot[0] for spot, fate in zip(spots, dealt, strict=True) if fate == "spare"]
-    for (T, thing), fate in zip(spots, dealt, strict=True):
-        if fate == "spare":
-            continue
-        goal = free.pop() if fate == "moved" and free else None
-        plan.deal(fate, thing, T, goal, nudge(rng, 0.008, 0.03))
+def _patrol(shop: Workshop, partial: bool, length: float, aisle: float, frames: int) -> np.ndarray:
+    """Up the aisle looking at one side, across the end, and back looking at the other.
 
-
-def _patrol(shop: Workshop, visit: int, length: float, aisle: float, frames: int) -> np.ndarray:
-    """Up the aisle looking at one side, across the end, and back looking at the other."""
+    A partial patrol leaves out the far bays of one side.
+    """
     rng = shop.rng
-    height = shop.between(1.55, 1.85)
-    ahead, reach = shop.between(0.5, 1.3), length / 2
-    near = aisle / 2 * shop.between(0.55, 0.75)
-    stop = -reach if visit == 0 else -reach + shop.between(0.12, 0.25) * length
-    down = shop.between(0.85, 1.2)
+    height = shop.between(1.35, 1.95)
+    ahead, reach = shop.between(0.3, 1.4), length / 2
+    near = aisle / 2 * shop.between(0.5, 0.78)
+    stop = -reach + (shop.between(0.2, 0.45) * length if partial else 0.0)
+    down = shop.between(0.8, 1.25)
+    first = float(rng.choice([-1, 1]))  # the side walked along first
     positions, targets = [], []
     for x in np.linspace(-reach - 0.6, reach + 0.2, 6):
-        positions.append((x, -near, height))
-        targets.append((x + ahead, aisle / 2 + 0.4, down))
+        positions.append((x, -first * near, height))
+        targets.append((x + ahead, first * (aisle / 2 + 0.4), down))
     positions.append((reach + 0.6, 0, height))
-    targets.append((reach + 3.2, aisle / 2 - 0.6, 0.5))
-    positions.append((reach + 0.4, near * 0.6, height))
-    targets.append((reach + 3.2, -aisle / 2 - 0.2, 0.4))
+    targets.append((reach + 3.2, first * (aisle / 2 - 0.6), 0.5))
+    positions.append((reach + 0.4, first * near * 0.6, height))
+    targets.append((reach + 3.2, -first * (aisle / 2 + 0.2), 0.4))
     for x in np.linspace(reach + 0.3, stop, 6):
-        positions.append((x, near, height))
-        targets.append((x - ahead, -aisle / 2 - 0.4, down))
-    order = slice(None) if visit == 0 or rng.random() < 0.5 else slice(None, None, -1)
+        positions.append((x, first * near, height + shop.between(-0.1, 0.1)))
+        targets.append((x - ahead, -first * (aisle / 2 + 0.4), down))
+    order = slice(None) if rng.random() < 0.5 else slice(None, None, -1)
     return walk(np.array(positions)[order], np.array(targets)[order], frames, rng, 0.025)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.camera import PinholeCamera
 from pipeline.synthetic.atlas import TextureAtlas
+from pipeline.synthetic.motion import is_move
 from pipeline.synthetic.shapes import Mesh, join
 
 Pose = NDArray[np.float64]
@@ -24,6 +25,8 @@ class SceneObject:
         mesh: in the frame of the object, standing on z = 0.
         poses: T_world_object of visit 0 and visit 1, each (4, 4); None = not there in that visit.
         replaced_by: the object that took its place in visit 1.
+        symmetry_order: of shape and print together: 1 = none, n = n-fold about its z axis, 0 = any angle.
+        story: how it changed, for people and for tables by kind of change (see ``changes``).
     """
 
     object_id: int
@@ -31,12 +34,13 @@ class SceneObject:
     mesh: Mesh
     poses: tuple[Pose | None, Pose | None]
     replaced_by: int | None = None
+    symmetry_order: int = 1
+    story: str = ""
 
     @property
     def is_moved(self) -> bool:
-        """Whether it is there in both visits, at another pose."""
-        previous, current = self.poses
-        return previous is not None and current is not None and not np.array_equal(previous, current)
+        """Whether it is there in both visits and was moved (see ``motion``: 5 cm, 10 degrees)."""
+        return is_move(self)
 
     @property
     def fate(self) -> str:

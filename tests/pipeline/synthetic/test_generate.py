@@ -4,6 +4,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import open3d as o3d
 import pytest
 from scipy.spatial import cKDTree
 
@@ -12,7 +13,7 @@ from pipeline.errors import InputError, OasisError, StorageError
 from pipeline.ply import NOT_SCORED, read_ply
 from pipeline.progress import ProgressEvent
 from pipeline.result import ChangeLabel
-from pipeline.synthetic import SCENES, generate
+from pipeline.synthetic import SCENES, build_scene, generate
 
 SMALL = (160, 120)
 FRAMES = 8
@@ -96,6 +97,35 @@ def test_labels_and_identities_are_consistent(made):
             assert name in allowed.get(thing["fate"], {thing["fate"]})
 
 
+def test_true_motions_carry_the_points_of_one_visit_onto_the_object_in_the_other(made):
+    truth = read_ply(made / "gt.ply")
+    answer = json.loads((made / "gt.json").read_text())
+    assert answer["schema_version"] == 1
+    moved = set(truth.object_id[truth.label == ChangeLabel.MOVED].tolist())
+    assert moved == {motion["object_id"] for motion in answer["motions"]}
+    drawn = build_scene(made.name, 5, FRAMES, SMALL)
+    for motion in answer["motions"]:
+        thing = drawn.objects[motion["object_id"] - 1]
+        T = np.array(motion["T_world_motion"])
+        np.testing.assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-6)
+        mine = truth.object_id == thing.object_id
+        before = transform_points(T, truth.points_world[mine & (truth.session == 0)])
+        surface = o3d.t.geometry.RaycastingScene()
+        corners = thing.mesh.placed(thing.poses[1]).corners.reshape(-1, 3)
+        triangles = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
+        surface.add_triangles(o3d.core.Tensor(np.ascontiguousarray(corners)), o3d.core.Tensor(triangles))
+        gap = surface.compute_distance(o3d.core.Tensor(before.astype(np.float32))).numpy()
+        assert gap.max() < 0.004
+        assert motion["symmetry_order"] >= 0
+
+
+def test_what_one_visit_never_looked_at_is_not_scored(made):
+    truth = read_ply(made / "gt.ply")
+    for visit in (0, 1):
+        share = (truth.label[truth.session == visit] == NOT_SCORED).mean()
+        assert 0 < share < 0.6
+
+
 def test_points_of_an_object_lie_on_it_in_each_visit(made):
     truth = read_ply(made / "gt.ply")
     for thing in json.loads((made / "scene.json").read_text())["objects"]:
@@ -112,10 +142,12 @@ def test_a_replacement_stands_where_the_old_thing_stood(made):
     pairs = [(t, by_id[t["replaced_by"]]) for t in by_id.values() if t["replaced_by"]]
     assert pairs
     for old, new in pairs:
-        assert old["class"] == new["class"] and (old["fate"], new["fate"]) == ("replaced", "appeared")
+        assert (old["fate"], new["fate"]) == ("replaced", "appeared")
         shift = np.subtract(old["T_world_object"][0], new["T_world_object"][1])[:3, 3]
         assert np.linalg.norm(shift) < 0.35 * max(old["extent_m"])
-        np.testing.assert_allclose(old["extent_m"], new["extent_m"], rtol=0.8, atol=0.2)
+        if old["story"] != "different":
+            assert old["class"] == new["class"]
+            np.testing.assert_allclose(old["extent_m"], new["extent_m"], rtol=0.8, atol=0.2)
 
 
 def test_every_kind_of_change_happens(made):
