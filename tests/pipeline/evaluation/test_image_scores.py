@@ -39,6 +39,7 @@ def test_masks_are_counted_and_small_or_unscored_ones_left_out() -> None:
     assert masks.true_px == {1: 60}
     assert masks.predicted_px == {11: 60, 13: 50}  # 12 lies on what is not scored, 13 mostly does not
     assert masks.shared_px == {(1, 11): 40}
+    assert masks.changed_px == (40, 60 + 10 + 20 + 30)  # shared; and 1, 2, the rest of 11 and of 13
     assert masks.best_match(11) is None  # 40 of 80: exactly half is not above half
     assert count_masks(1, image((0, 6, 1)), image((1, 7, 11))).best_match(11) == 1
 
@@ -59,6 +60,7 @@ def test_scenediff_counted_by_hand() -> None:
     # Objects: 1, 3 before, 3 after, 2; 12 is the second on object 1: a false positive.
     assert (scores.true_objects, scores.predicted_objects) == (4, 4)
     assert scores.per_scene == pytest.approx(2 / 4)
+    assert scores.pixel_iou == pytest.approx((80 + 100 + 40) / (100 + 100 + 40 + 100 + 100 + 60))
     # With change type: 1, 2 and the move; only 11 is right, the move needs both visits.
     assert scores.true_typed_objects == 3
     assert scores.per_scene_typed == pytest.approx(1 / 3)
