@@ -10,7 +10,7 @@ ARGS ?=
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint format benchmark clean help
+.PHONY: demo test lint format benchmark speed clean help
 
 demo: $(VENV)/installed
 	$(BIN)/oasisview demo $(ARGS)
@@ -27,14 +27,21 @@ format: $(VENV)/installed
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+# How good: every method on every kind of scene, on the seeds that are kept for reporting. Takes about an hour;
+# it goes on where it stopped. A part of it: make benchmark ARGS="--scenes office --seeds 1 --methods oasis"
 benchmark: $(VENV)/installed
+	$(BIN)/python benchmarks/evaluate_methods.py --seeds 101 102 103 --keep .oasisview/benchmark \
+		--json .oasisview/benchmark/measured.json --plot .oasisview/benchmark $(ARGS)
+
+# How fast, and how much memory.
+speed: $(VENV)/installed
 	$(BIN)/python benchmarks/speed.py $(ARGS)
 
 clean:
 	rm -rf $(VENV)
 
 help:
-	@echo "make demo | test | lint | format | benchmark | clean"
+	@echo "make demo | test | lint | format | benchmark | speed | clean"
 
 $(VENV)/bin/python:
 	.ci/system-packages libraries venv

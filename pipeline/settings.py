@@ -22,6 +22,15 @@ def setting(default: Any, help: str, *, unit: str = "", symbol: str = "", least:
 
 
 @dataclass(frozen=True)
+class RunSettings:
+    """Which method decides what changed."""
+
+    method: Literal["oasis", "geometric", "conceptgraphs", "wheres-my-glasses"] = setting(
+        "oasis", "oasis = this engine; the others are baselines on the same keyframes (pipeline/baselines)"
+    )
+
+
+@dataclass(frozen=True)
 class ArchiveSettings:
     """What is accepted as an archive."""
 
@@ -201,9 +210,61 @@ class ChangeSettings:
 
 
 @dataclass(frozen=True)
+class BaselineSettings:
+    """The baselines of the paper; values are the published ones unless the help says otherwise."""
+
+    knn_count: int = setting(2, "geometric: nearest points of the other visit to average over", least=1)
+    knn_distance_m: float = setting(
+        0.1, "geometric: farther from the other visit's points, a point differs", unit="m"
+    )
+    knn_distance_voxels: float = setting(
+        2.0,
+        "geometric: least such distance where voxels are coarse (published: 0.1 m at 0.05 m)",
+        unit="voxels",
+    )
+    range_cell_deg: float = setting(0.4, "geometric: cell of the range images", unit="deg")
+    range_difference_m: float = setting(0.1, "geometric: ranges differ from this on", unit="m")
+    peeling_rounds: int = setting(
+        3, "geometric: times that differences are split into strong and weak", least=1
+    )
+    propagation_m: float = setting(
+        1.0, "geometric: weak negative differences this near strong ones join", unit="m"
+    )
+    cluster_voxels: int = setting(
+        25,
+        "geometric: smaller clusters of differences share one entry (ours: it has no objects)",
+        unit="voxels",
+    )
+    merge_similarity: float = setting(
+        1.1, "conceptgraphs: least sum of overlap and similarity for a mask to join an object"
+    )
+    min_mask_voxels: int = setting(16, "conceptgraphs: smaller masks are skipped", unit="voxels")
+    min_detections: int = setting(3, "conceptgraphs: objects of fewer masks are dropped", least=1)
+    min_similarity: float = setting(
+        0.9,
+        "conceptgraphs, wheres-my-glasses: least cosine of the embeddings of one object (ours: not CLIP's)",
+    )
+    gate_m: float = setting(
+        0.9, "wheres-my-glasses: an object is looked for this far around its bounds (value of POCD)", unit="m"
+    )
+    min_expected_share: float = setting(
+        0.2, "wheres-my-glasses: share of an object in plain view from which it is expected (value of POCD)"
+    )
+    prior_hits: float = setting(3.0, "wheres-my-glasses: Beta prior of the stationarity (ours)")
+    prior_misses: float = setting(2.0, "wheres-my-glasses: Beta prior of the stationarity (ours)")
+    missing_below: float = setting(
+        0.45, "wheres-my-glasses: objects less stationary are missing (value of POCD)"
+    )
+    displacement_m: float = setting(
+        0.1, "objects found again farther away have moved (the paper's tau_d)", unit="m", symbol="tau_d"
+    )
+
+
+@dataclass(frozen=True)
 class Settings:
     """All settings of a run."""
 
+    run: RunSettings = field(default_factory=RunSettings)
     archive: ArchiveSettings = field(default_factory=ArchiveSettings)
     image: ImageSettings = field(default_factory=ImageSettings)
     keyframes: KeyframeSettings = field(default_factory=KeyframeSettings)
@@ -216,6 +277,7 @@ class Settings:
     correspondence: CorrespondenceSettings = field(default_factory=CorrespondenceSettings)
     association: AssociationSettings = field(default_factory=AssociationSettings)
     change: ChangeSettings = field(default_factory=ChangeSettings)
+    baseline: BaselineSettings = field(default_factory=BaselineSettings)
 
     def to_dict(self) -> dict[str, dict[str, Any]]:
         """Plain nested dictionary, as stored in ``result.json``."""

@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from functools import partial
 from hashlib import blake2b
 from itertools import count
 from pathlib import Path
@@ -18,9 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline import checkpoint
-from pipeline.assemble import Assembled, assemble
-from pipeline.change.change_score import appearance_trust
-from pipeline.change.decide import Conclusion, decide
 from pipeline.change.observe import MutualObservation, observe
 from pipeline.correspondence.compare import (
     Comparison,
@@ -31,13 +27,13 @@ from pipeline.correspondence.compare import (
 )
 from pipeline.errors import OasisError
 from pipeline.mapping.dense_map import dense_map
-from pipeline.mapping.find_objects import find_objects
 from pipeline.mapping.front_end import KeyframeSinks, SessionGeometry, map_session, reopen_stores
 from pipeline.mapping.keyframes import select_keyframes
 from pipeline.mapping.objects import SessionObjects
 from pipeline.mapping.scale import voxel_size_m
+from pipeline.methods import MappedVisits, Method, Outcome, chosen_method
 from pipeline.perception.protocols import FeatureExtractor
-from pipeline.perception.registry import feature_extractor, mask_generator
+from pipeline.perception.registry import feature_extractor
 from pipeline.progress import ProgressEvent, Report, Warned, silent
 from pipeline.readers import open_session
 from pipeline.readers.fingerprint import fingerprint
@@ -73,7 +69,7 @@ def run(
         StorageError: the result cannot be written.
     """
     settings = settings or Settings()
-    extractor = feature_extractor(settings)
+    extractor, method = feature_extractor(settings), chosen_method(settings)
     report(ProgressEvent("open", 0, 2))
     sessions = (open_session(Path(previous)), open_session(Path(current)))
     for session in sessions:
@@ -87,7 +83,7 @@ def run(
     if finished is not None:
         return finished
     with ResultWriter(path, key) as writer:
-        return _Run(sessions, fingerprints, settings, extractor, writer, report).result()
+        return _Run(sessions, fingerprints, settings, extractor, method, writer, report).result()
 
 
 def run_key(fingerprints: tuple[str, ...], settings: Settings) -> str:
@@ -105,6 +101,7 @@ class _Run:
         fingerprints: tuple[str, ...],
         settings: Settings,
         extractor: FeatureExtractor,
+        method: Method,
         writer: ResultWriter,
         report: Report,
     ) -> None:
@@ -112,6 +109,7 @@ class _Run:
         self._fingerprints = fingerprints
         self._settings = settings
         self._extractor = extractor
+        self._method = method
         self._writer = writer
         self._report = report
         self._timings_s: dict[str, float] = {}
@@ -122,12 +120,12 @@ class _Run:
         geometries = self._front_end()
         covisibility = self._covisibility(geometries)
         observation = self._observe(geometries)
-        objects = self._objects(geometries, observation)
+        mapped = self._mapped(geometries, covisibility, observation)
+        objects = self._objects(mapped)
         visits = self._visit_images(geometries, objects)
         comparison = self._compare(visits, covisibility)
-        conclusion = self._decide(visits, observation, comparison)
-        assembled = assemble(*visits, conclusion, self._settings)
-        return self._write(visits, covisibility, conclusion, assembled)
+        outcome = self._decide(mapped, visits, comparison)
+        return self._write(visits, covisibility, outcome)
 
     def _front_end(self) -> tuple[SessionGeometry, SessionGeometry]:
         settings = self._settings
@@ -198,34 +196,33 @@ class _Run:
             checkpoint.save_observation(self._writer, observation)
             return observation
 
-    def _objects(
-        self, geometries: tuple[SessionGeometry, SessionGeometry], observation: MutualObservation
-    ) -> tuple[SessionObjects, SessionObjects]:
-        observed = (observation.of_previous, observation.of_current)
-        is_noise = (observation.is_noise0, observation.is_noise1)
+    def _mapped(
+        self,
+        geometries: tuple[SessionGeometry, SessionGeometry],
+        covisibility: Covisibility,
+        observation: MutualObservation,
+    ) -> MappedVisits:
+        features = [self._features(visit, geometry) for visit, geometry in enumerate(geometries)]
+        images = [self._images(visit, geometry) for visit, geometry in enumerate(geometries)]
+        return MappedVisits(
+            geometries=geometries,
+            covisibility=covisibility,
+            observation=observation,
+            features=(features[0], features[1]),
+            images=(images[0], images[1]),
+            extractor=self._extractor,
+            settings=self._settings,
+        )
 
-        def find(visit: int) -> SessionObjects:
-            geometry = geometries[visit]
-            objects = find_objects(
-                geometry,
-                observed[visit].is_seen_through(self._settings.observation),
-                is_noise[visit],
-                mask_generator(self._settings),
-                self._extractor,
-                self._features(visit, geometry),
-                partial(self._image, visit, geometry),
-                self._settings,
-            )
-            checkpoint.save_objects(self._writer, visit, objects)
-            return objects
-
+    def _objects(self, mapped: MappedVisits) -> tuple[SessionObjects, SessionObjects]:
         with self._stage("objects") as is_done:
             if is_done:
                 return checkpoint.load_objects(self._writer, 0), checkpoint.load_objects(self._writer, 1)
-            with ThreadPoolExecutor(len(VISITS)) as threads:
-                previous, current = threads.map(find, range(len(VISITS)))
+            objects = self._method.find_objects(mapped)
+            for visit, of_visit in enumerate(objects):
+                checkpoint.save_objects(self._writer, visit, of_visit)
             self._report(ProgressEvent("objects", 2, 2))
-            return previous, current
+            return objects
 
     def _visit_images(
         self,
@@ -260,22 +257,19 @@ class _Run:
             return comparison
 
     def _decide(
-        self,
-        visits: tuple[VisitImages, VisitImages],
-        observation: MutualObservation,
-        comparison: Comparison,
-    ) -> Conclusion:
+        self, mapped: MappedVisits, visits: tuple[VisitImages, VisitImages], comparison: Comparison
+    ) -> Outcome:
         with self._stage("decide"):
             on_submap = self._progress("decide", len(comparison.evidence))
-            return decide(*visits, observation, comparison, self._extractor, self._settings, on_submap)
+            return self._method.conclude(mapped, visits, comparison, on_submap)
 
     def _write(
         self,
         visits: tuple[VisitImages, VisitImages],
         covisibility: Covisibility,
-        conclusion: Conclusion,
-        assembled: Assembled,
+        outcome: Outcome,
     ) -> Result:
+        assembled = outcome.assembled
         ids = (assembled.ids0, assembled.ids1)
         covisible = (covisibility.of_previous, covisibility.of_current)
         total = sum(len(visit.geometry.keyframes) for visit in visits)
@@ -303,15 +297,14 @@ class _Run:
                 up_world=geometry.surface.up_world,
                 keyframes=_keyframe_records(geometry, covisible[visit]),
             )
-            evidence = (conclusion.previous, conclusion.current)[visit]
-            self._writer.write_evidence(visit, evidence.objects.table(evidence.log_odds))
+            self._writer.write_evidence(visit, outcome.evidence[visit])
         self._writer.write_objects(
             assembled.objects, assembled.replaced, assembled.score_matrix, assembled.belief
         )
         self._timings_s["write"] = round(time.perf_counter() - started, 3)
-        return self._writer.finish(self._manifest(visits, conclusion))
+        return self._writer.finish(self._manifest(visits, outcome))
 
-    def _manifest(self, visits: tuple[VisitImages, VisitImages], conclusion: Conclusion) -> dict[str, object]:
+    def _manifest(self, visits: tuple[VisitImages, VisitImages], outcome: Outcome) -> dict[str, object]:
         return {
             "settings": self._settings.to_dict(),
             "inputs": [
@@ -329,10 +322,7 @@ class _Run:
             "weights": {"features": self._extractor.weights_hash},
             "quality": {
                 "voxel_size_m": round(visits[0].geometry.surface.voxel_size_m, 6),
-                "appearance_scale_log": round(conclusion.appearance_scale, 4),
-                "appearance_trust": round(
-                    appearance_trust(conclusion.appearance_scale, self._settings.change), 4
-                ),
+                **outcome.quality,
             },
             "warnings": self._warnings,
             "timings_s": self._timings_s,
@@ -342,8 +332,9 @@ class _Run:
         frames = [keyframe.frame_index for keyframe in geometry.keyframes]
         return lambda k: self._writer.read_features(visit, frames[k])
 
-    def _image(self, visit: int, geometry: SessionGeometry, k: int) -> NDArray[np.uint8]:
-        return self._writer.read_image(visit, geometry.keyframes[k].frame_index)
+    def _images(self, visit: int, geometry: SessionGeometry) -> Callable[[int], NDArray[np.uint8]]:
+        frames = [keyframe.frame_index for keyframe in geometry.keyframes]
+        return lambda k: self._writer.read_image(visit, frames[k])
 
     def _progress(self, stage: str, total: int) -> Callable[[int], None]:
         return lambda done: self._report(ProgressEvent(stage, done, total))

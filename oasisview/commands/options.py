@@ -13,6 +13,9 @@ from pipeline.settings import Settings
 # As in pipeline.synthetic, which is heavy to import; a test holds the two together.
 SCENE_FRAMES = 40
 SCENES = ("office", "carpark", "warehouse", "market")
+HELD_OUT_SCENES = ("hillside", "tunnel")
+# As in pipeline.methods, which is heavy to import; a test holds the two together.
+METHODS = ("oasis", "geometric", "conceptgraphs", "wheres-my-glasses")
 
 
 def add_serve_options(parser: argparse.ArgumentParser) -> None:
@@ -30,8 +33,13 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_engine_options(parser: argparse.ArgumentParser) -> None:
-    """``--set``, ``--features``, ``--masks``."""
+    """``--method``, ``--set``, ``--features``, ``--masks``."""
     group = parser.add_argument_group("engine")
+    group.add_argument(
+        "--method",
+        choices=METHODS,
+        help="what decides: this engine (oasis, default) or a baseline on the same keyframes",
+    )
     group.add_argument(
         "--set",
         dest="overrides",
@@ -57,6 +65,8 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
         if not equals:
             raise InputError(f"--set {override} names no value", "write --set section.name=value")
         settings = settings.override(name.strip(), value.strip())
+    if arguments.method is not None:
+        settings = settings.override("run.method", arguments.method)
     for kind in ("features", "masks"):
         backend = getattr(arguments, kind)
         if backend is not None:

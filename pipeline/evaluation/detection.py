@@ -8,6 +8,7 @@ count, scored or not: finding an object does not need the other visit.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,4 +62,15 @@ def detection_scores(
             tp=len(matched), fp=predicted_count - len(matched), fn=len(overlap.true_ids) - len(matched)
         ),
         mean_iou=float(matched.mean()) if len(matched) else None,
+    )
+
+
+def all_detection_scores(
+    overlaps: Sequence[Overlap], predicted_counts: Sequence[int]
+) -> tuple[DetectionScores, ...]:
+    """Every visit at every threshold of ``THRESHOLDS``; arguments per visit, as in ``detection_scores``."""
+    return tuple(
+        detection_scores(overlap, session, threshold, predicted_counts[session])
+        for session, overlap in enumerate(overlaps)
+        for threshold in THRESHOLDS
     )

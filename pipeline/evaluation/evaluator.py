@@ -9,7 +9,7 @@ from pipeline.evaluation.abstention import abstention_scores
 from pipeline.evaluation.association import association_scores
 from pipeline.evaluation.background import background_scores
 from pipeline.evaluation.calibration import calibration_scores
-from pipeline.evaluation.detection import THRESHOLDS, DetectionScores, detection_scores
+from pipeline.evaluation.detection import all_detection_scores
 from pipeline.evaluation.displacement import displacement_scores
 from pipeline.evaluation.ground_truth import GroundTruth, read_ground_truth
 from pipeline.evaluation.identity import identity_scores
@@ -84,7 +84,7 @@ def report_of(matched: Matched) -> Report:
         overridden=matched.overridden,
         pointwise=pointwise_scores(units, invented_labels(units, matched.visits, matched.radius_m)),
         replaced=replaced_scores(units, matched.result.replaced),
-        detection=detections(matched),
+        detection=all_detection_scores(overlaps, matched.predicted_counts),
         identity=tuple(identity),
         association=tuple(association),
         displacement=tuple(displacement),
@@ -93,13 +93,4 @@ def report_of(matched: Matched) -> Report:
         verdicts=found,
         calibration=calibration_scores(found),
         abstention=abstention_scores(found),
-    )
-
-
-def detections(matched: Matched) -> tuple[DetectionScores, ...]:
-    """Detection of every visit at every threshold."""
-    return tuple(
-        detection_scores(overlap, session, threshold, matched.predicted_counts[session])
-        for session, overlap in enumerate(matched.overlaps)
-        for threshold in THRESHOLDS
     )

@@ -13,7 +13,7 @@ from typing import Any
 
 from pipeline.evaluation.association import AssociationScores, association_scores
 from pipeline.evaluation.counts import Counts, mean_defined, pooled
-from pipeline.evaluation.detection import THRESHOLDS, DetectionScores, detection_scores
+from pipeline.evaluation.detection import DetectionScores, all_detection_scores
 from pipeline.evaluation.matched import Matched
 from pipeline.evaluation.replaced import ReplacedScores, replaced_scores
 from pipeline.evaluation.report import association_rows
@@ -76,10 +76,6 @@ def paper_scores(matched: Matched) -> PaperScores:
     before, after = matched.overlaps[:2]
     return PaperScores(
         change=replaced_scores(matched.units, matched.result.replaced),
-        detection=tuple(
-            detection_scores(overlap, session, threshold, matched.predicted_counts[session])
-            for session, overlap in enumerate(matched.overlaps)
-            for threshold in THRESHOLDS
-        ),
+        detection=all_detection_scores(matched.overlaps, matched.predicted_counts),
         association=association_scores(matched.units, before, after, (0, 1), matched.labels),
     )

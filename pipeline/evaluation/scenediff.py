@@ -6,6 +6,7 @@ pixels of its points. Predicted masks: the result's own object masks of the keyf
 changed (disappeared in the previous visit, appeared in the current one, moved in both), with the object's
 confidence.
 
+*Pixels*: intersection over union of all changed pixels, all keyframes merged.
 *Per image*: every mask in every keyframe is a detection. In order of confidence it takes the true mask of
 that image with the greatest IoU, if that is above 0.5 and not taken (duplicates: 1, a second detection of a
 mask is a false positive). Average precision after VOC. *Per scene*: every object is one detection, judged in
@@ -53,12 +54,15 @@ class KeyframeMasks:
     Attributes:
         true_px, predicted_px: area by object id.
         shared_px: by (true, predicted) object id.
+        changed_px: pixels that changed in truth and in the prediction, and in at least one of them; what
+            is not scored is in neither.
     """
 
     session: int
     true_px: dict[int, int]
     predicted_px: dict[int, int]
     shared_px: dict[tuple[int, int], int]
+    changed_px: tuple[int, int] = (0, 0)
 
     def best_match(self, predicted_id: int, allowed: set[int] | None = None) -> int | None:
         """True object with the greatest IoU above ``MIN_IOU``; ``allowed`` limits the choice."""
@@ -75,14 +79,16 @@ class KeyframeMasks:
 
 @dataclass(frozen=True)
 class SceneDiffScores:
-    """Average precisions; None where nothing changed in view.
+    """Average precisions and IoU; None where nothing changed in view.
 
     Attributes:
+        pixel_iou: changed pixels of all keyframes together, no objects and no confidence.
         per_image: of masks in images; per_scene: of objects; per_scene_typed: of objects with change type.
         true_masks, true_objects, true_typed_objects: what there was to find.
         predicted_masks, predicted_objects: detections that were counted.
     """
 
+    pixel_iou: float | None
     per_image: float | None
     per_scene: float | None
     per_scene_typed: float | None
@@ -98,14 +104,14 @@ class SceneDiffScores:
 
     def lines(self) -> list[str]:
         """The table."""
-        return aligned(
-            [
-                ("average precision", "AP", "to find", "detections"),
-                ("per image", number(self.per_image), str(self.true_masks), str(self.predicted_masks)),
-                ("per scene", number(self.per_scene), str(self.true_objects), str(self.predicted_objects)),
-                ("per scene, change type", number(self.per_scene_typed), str(self.true_typed_objects), ""),
-            ]
-        )
+        rows = [
+            ("average precision", "AP", "to find", "detections"),
+            ("per image", number(self.per_image), str(self.true_masks), str(self.predicted_masks)),
+            ("per scene", number(self.per_scene), str(self.true_objects), str(self.predicted_objects)),
+            ("per scene, change type", number(self.per_scene_typed), str(self.true_typed_objects), ""),
+        ]
+        pixels = f"IoU of changed pixels, all keyframes together: {number(self.pixel_iou)}"
+        return [*aligned(rows), pixels]
 
 
 def scenediff_scores(matched: Matched) -> SceneDiffScores:
@@ -146,7 +152,9 @@ def score_masks(
         scene_right.append(true_id is not None and (session, true_id) not in claimed)
         if true_id is not None:
             claimed.add((session, true_id))
+    shared, either = (sum(masks.changed_px[side] for masks in keyframes) for side in (0, 1))
     return SceneDiffScores(
+        pixel_iou=shared / either if either else None,
         per_image=average_precision([c for c, _, _ in image_detections], image_right, true_masks),
         per_scene=average_precision([confidence[p] for _, p in scene], scene_right, len(seen)),
         per_scene_typed=average_precision(
@@ -241,6 +249,10 @@ def count_masks(session: int, true: NDArray[np.int64], predicted: NDArray[np.int
             if area >= MIN_MASK_PX and table.get((UNSCORED, p), 0) <= area / 2
         },
         {pair: count for pair, count in table.items() if min(pair) > 0},
+        (
+            sum(count for pair, count in table.items() if min(pair) > 0),
+            sum(count for pair, count in table.items() if min(pair) >= 0 and max(pair) > 0),
+        ),
     )
 
 

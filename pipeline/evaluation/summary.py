@@ -46,6 +46,7 @@ PAIR_COLUMNS: dict[str, Callable[[Report], float | None]] = {
     "det. R@.5": lambda report: _detection(report, 0.5).recall,
     "id static R": lambda report: _identity_recall(report, ChangeLabel.STATIC),
     "id moved R": lambda report: _identity_recall(report, ChangeLabel.MOVED),
+    "id distinct R": lambda report: _identity_distinct(report, PERSISTENT),
     "id P": lambda report: _identity_precision(report, PERSISTENT),
     "displ. err m": lambda report: mean_defined(item.mean_error_m for item in report.displacement),
     "rot. err deg": lambda report: mean_defined(item.mean_error_deg for item in report.rotation),
@@ -142,6 +143,11 @@ def _detection(report: Report, threshold: float) -> Counts:
 def _identity_recall(report: Report, label: ChangeLabel) -> float | None:
     scores = [pair[label] for pair in report.identity]
     return _share(sum(item.kept for item in scores), sum(item.present for item in scores))
+
+
+def _identity_distinct(report: Report, labels: tuple[ChangeLabel, ...]) -> float | None:
+    scores = [pair[label] for pair in report.identity for label in labels]
+    return _share(sum(item.distinct for item in scores), sum(item.present for item in scores))
 
 
 def _identity_precision(report: Report, labels: tuple[ChangeLabel, ...]) -> float | None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from fixture_scene import CAMERA, OBJECTS, camera_pose, render
 
+import pipeline.oasis as method_module
 import pipeline.system as run_module
 from pipeline.change.decision import NOT_MET
 from pipeline.errors import SceneMismatchError
@@ -99,7 +100,7 @@ def test_interrupted_run_goes_on_where_it_stopped(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(run_module, interrupted, power_cut)
+        patch.setattr(run_module if interrupted == "compare" else method_module, interrupted, power_cut)
         with pytest.raises(KeyboardInterrupt):
             run(*archives, settings=SETTINGS, output=output)
     assert not output.exists()

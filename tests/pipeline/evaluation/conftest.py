@@ -77,7 +77,11 @@ class SceneBuilder:
         object_id = np.array([row[2] for row in rows], dtype=np.int32)
         sessions = tuple(
             SimpleNamespace(
-                index=s, points_world=points[session == s], object_ids=object_id[session == s], keyframes=()
+                index=s,
+                points_world=points[session == s],
+                object_ids=object_id[session == s],
+                keyframes=(),
+                up_world=np.array([0.0, 0.0, 1.0]),
             )
             for s in (0, 1)
         )

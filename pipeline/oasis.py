@@ -1,0 +1,65 @@
+"""The engine's own method: objects refined by change, patch-to-mask association, evidence per place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+from pipeline.assemble import assemble
+from pipeline.change.change_score import appearance_trust
+from pipeline.change.decide import decide
+from pipeline.correspondence.compare import Comparison, VisitImages
+from pipeline.mapping.find_objects import find_objects
+from pipeline.mapping.objects import SessionObjects
+from pipeline.methods import MappedVisits, Outcome
+from pipeline.perception.registry import mask_generator
+
+VISITS = 2
+
+
+class OasisMethod:
+    """See the module's docstring."""
+
+    name = "oasis"
+
+    def find_objects(self, mapped: MappedVisits) -> tuple[SessionObjects, SessionObjects]:
+        """Objects of both visits at once: they are independent."""
+        observation, settings = mapped.observation, mapped.settings
+        observed = (observation.of_previous, observation.of_current)
+        is_noise = (observation.is_noise0, observation.is_noise1)
+
+        def find(visit: int) -> SessionObjects:
+            return find_objects(
+                mapped.geometries[visit],
+                observed[visit].is_seen_through(settings.observation),
+                is_noise[visit],
+                mask_generator(settings),
+                mapped.extractor,
+                mapped.features[visit],
+                mapped.images[visit],
+                settings,
+            )
+
+        with ThreadPoolExecutor(VISITS) as threads:
+            previous, current = threads.map(find, range(VISITS))
+        return previous, current
+
+    def conclude(
+        self,
+        mapped: MappedVisits,
+        visits: tuple[VisitImages, VisitImages],
+        comparison: Comparison,
+        on_submap: Callable[[int], None],
+    ) -> Outcome:
+        """Decide submap by submap and assemble."""
+        settings = mapped.settings
+        conclusion = decide(*visits, mapped.observation, comparison, mapped.extractor, settings, on_submap)
+        tables = [
+            evidence.objects.table(evidence.log_odds)
+            for evidence in (conclusion.previous, conclusion.current)
+        ]
+        quality = {
+            "appearance_scale_log": round(conclusion.appearance_scale, 4),
+            "appearance_trust": round(appearance_trust(conclusion.appearance_scale, settings.change), 4),
+        }
+        return Outcome(assemble(*visits, conclusion, settings), (tables[0], tables[1]), quality)
