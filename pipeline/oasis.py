@@ -9,6 +9,7 @@ from pipeline.assemble import assemble
 from pipeline.change.change_score import appearance_trust
 from pipeline.change.decide import decide
 from pipeline.correspondence.compare import Comparison, VisitImages
+from pipeline.correspondence.pattern_comparison import compare_patterns
 from pipeline.mapping.find_objects import find_objects
 from pipeline.mapping.objects import SessionObjects
 from pipeline.methods import MappedVisits, Outcome
@@ -53,7 +54,10 @@ class OasisMethod:
     ) -> Outcome:
         """Decide submap by submap and assemble."""
         settings = mapped.settings
-        conclusion = decide(*visits, mapped.observation, comparison, mapped.extractor, settings, on_submap)
+        patterns = compare_patterns(*visits, mapped.covisibility, settings.pattern)
+        conclusion = decide(
+            *visits, mapped.observation, comparison, patterns, mapped.extractor, settings, on_submap
+        )
         tables = [
             evidence.objects.table(evidence.log_odds)
             for evidence in (conclusion.previous, conclusion.current)

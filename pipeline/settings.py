@@ -173,6 +173,20 @@ class CorrespondenceSettings:
 
 
 @dataclass(frozen=True)
+class PatternSettings:
+    """Comparison of fine patterns, pixel by pixel."""
+
+    pairs_per_keyframe: int = setting(2, "best co-visible keyframes whose pixels are compared", least=1)
+    finest_pixels: float = setting(0.8, "finer than this is noise", unit="strided pixels")
+    coarsest_pixels: float = setting(5.0, "coarser than this is light and paint", unit="strided pixels")
+    window_pixels: int = setting(11, "patterns are correlated in windows of this size", unit="strided pixels")
+    search_radius_pixels: int = setting(
+        2, "a pattern is looked for this far from where the poses put it", unit="strided pixels"
+    )
+    same_correlation: float = setting(0.6, "a pattern that correlates less is another one")
+
+
+@dataclass(frozen=True)
 class AssociationSettings:
     """Score matrix, gates and assignment (paper, Sec. III-C.2)."""
 
@@ -189,12 +203,13 @@ class ChangeSettings:
     )
     # Weights of change_score, from benchmarks/fit_change_score.py on scenes that no table reports; with fewer
     # false alarms than at its optimum, as real depth is noisier than generated depth.
-    bias: float = setting(-3.48, "log odds of a change before any evidence")
-    seen_through_weight: float = setting(11.7, "log odds for a place that was seen to be empty")
-    dissimilarity_weight: float = setting(0.44, "log odds per spread of patch dissimilarity")
-    residual_weight: float = setting(1.56, "log odds per spread of the median colour residual")
-    texture_weight: float = setting(1.55, "log odds per spread of lost texture correlation")
-    tail_weight: float = setting(0.94, "log odds per spread of the share of unexplained colours")
+    bias: float = setting(-3.44, "log odds of a change before any evidence")
+    seen_through_weight: float = setting(9.73, "log odds for a place that was seen to be empty")
+    dissimilarity_weight: float = setting(1.39, "log odds per spread of patch dissimilarity")
+    residual_weight: float = setting(1.05, "log odds per spread of the median colour residual")
+    texture_weight: float = setting(1.99, "log odds per spread of lost texture correlation")
+    tail_weight: float = setting(1.01, "log odds per spread of the share of unexplained colours")
+    pattern_weight: float = setting(1.73, "log odds per spread of lost fine pattern")
     full_appearance_scale: float = setting(
         0.2, "colour spread between the visits up to which appearance counts fully", unit="log units"
     )
@@ -275,6 +290,7 @@ class Settings:
     merge: MergeSettings = field(default_factory=MergeSettings)
     observation: ObservationSettings = field(default_factory=ObservationSettings)
     correspondence: CorrespondenceSettings = field(default_factory=CorrespondenceSettings)
+    pattern: PatternSettings = field(default_factory=PatternSettings)
     association: AssociationSettings = field(default_factory=AssociationSettings)
     change: ChangeSettings = field(default_factory=ChangeSettings)
     baseline: BaselineSettings = field(default_factory=BaselineSettings)

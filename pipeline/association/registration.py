@@ -132,11 +132,11 @@ class _Target:
         self._points = np.asarray(cloud.points_world, np.float64)
         self._origin = self._points.mean(axis=0)
         self._gain, self._spacing_m = gain, spacing_m
-        self._features = self._embedded(self._points[None], np.asarray(cloud.log_colours, np.float64))[0]
+        self._features = self._embedded(self._points[None], cloud.log_colours)[0]
         self._norms = (self._features**2).sum(axis=1)
 
     def _embedded(
-        self, points: NDArray[np.float64], log_colours: NDArray[np.float64]
+        self, points: NDArray[np.float64], log_colours: NDArray[np.floating]
     ) -> NDArray[np.float32]:
         place = (points - self._origin) / self._spacing_m
         colour = np.broadcast_to(log_colours * _SPACINGS_PER_LOG_COLOUR / np.sqrt(3), place.shape)

@@ -28,11 +28,14 @@ PATCH_ALLOWANCE = 1.0
 _CLIP_LOW, _CLIP_HIGH = -3.0, 8.0
 _TAIL_FLOOR = 0.02
 _FULL_TEXTURE = 0.1
-# Median and robust spread of unchanged objects over the development scenes, and the least spread allowed.
-_DISSIMILARITY = (-2.1, 0.7, 0.2)
-_RESIDUAL = (0.16, 0.09, 0.03)
-_TEXTURE_LOSS = (-1.4, 0.45, 0.2)
-_TAIL = (-3.4, 0.55, 0.3)
+# Median and robust spread of unchanged objects over the development scenes.
+_DISSIMILARITY = (-2.1, 0.7)
+_RESIDUAL = (0.16, 0.09)
+_TEXTURE_LOSS = (-1.4, 0.45)
+_TAIL = (-3.4, 0.55)
+_PATTERN = (-1.1, 0.3)
+# An object of this many pattern pixels counts half.
+_RELIABLE_PIXELS = 60
 
 
 def change_log_odds(
@@ -48,7 +51,7 @@ def change_log_odds(
     Args:
         appearance_scale: spread of the colour residual between the visits, log units.
     """
-    seen_through, patches, residual, texture, tail = change_features(evidence).T
+    seen_through, patches, residual, texture, tail, pattern = change_features(evidence).T
     return (
         settings.bias
         + settings.seen_through_weight * seen_through
@@ -59,23 +62,30 @@ def change_log_odds(
             + settings.texture_weight * texture
             + settings.tail_weight * tail
         )
+        + settings.pattern_weight * pattern
     )
 
 
 def change_features(evidence: ObjectEvidence) -> NDArray[np.float64]:
-    """(K + 1, 5) what the weights apply to: seen-through share, and in spreads from the unchanged objects:
-    patch dissimilarity, colour residual, lost texture correlation, share of unexplained colours."""
+    """(K + 1, 6) what the weights apply to: seen-through share, and in spreads from the unchanged objects:
+    patch dissimilarity, colour residual, lost texture correlation, share of unexplained colours, lost fine pattern."""
     patches = _relative(
         evidence, np.nan_to_num(evidence.dissimilarity), _DISSIMILARITY, np.isfinite(evidence.dissimilarity)
     )
     residual = _relative(evidence, evidence.median_residual, _RESIDUAL)
     texture = _relative(evidence, _texture_loss(evidence), _TEXTURE_LOSS) * _textured(evidence)
     tail = _relative(evidence, np.log(evidence.tail_share + _TAIL_FLOOR), _TAIL)
-    colours = np.minimum(np.stack([residual, texture, tail], axis=1), (patches + PATCH_ALLOWANCE)[:, None])
+    shown = evidence.pattern_pixels / (evidence.pattern_pixels + _RELIABLE_PIXELS)
+    pattern = (
+        _relative(evidence, _pattern_loss(evidence), _PATTERN, evidence.pattern_pixels > 0, may_widen=False)
+        * shown
+    )
+    aligned = np.maximum(patches, pattern) + PATCH_ALLOWANCE
+    colours = np.minimum(np.stack([residual, texture, tail], axis=1), aligned[:, None])
     # An object of few compared voxels scatters: it counts less.
     weight = evidence.compared_count / (evidence.compared_count + _RELIABLE_VOXELS)
     appearance = np.concatenate([patches[:, None], colours], axis=1) * weight[:, None]
-    return np.concatenate([evidence.seen_through[:, None], appearance], axis=1)
+    return np.concatenate([evidence.seen_through[:, None], appearance, pattern[:, None]], axis=1)
 
 
 def appearance_trust(appearance_scale: float, settings: ChangeSettings) -> float:
@@ -96,6 +106,10 @@ def _texture_loss(evidence: ObjectEvidence) -> NDArray[np.float64]:
     return -np.arctanh(np.clip(evidence.texture_correlation, -0.9, 0.99))
 
 
+def _pattern_loss(evidence: ObjectEvidence) -> NDArray[np.float64]:
+    return -np.arctanh(np.clip(np.nan_to_num(evidence.pattern_correlation), -0.9, 0.99))
+
+
 def _textured(evidence: ObjectEvidence) -> NDArray[np.float64]:
     """How much the texture may count: nothing on plain surfaces, all on printed ones."""
     return np.clip(evidence.texture / _FULL_TEXTURE, 0, 1)
@@ -104,24 +118,30 @@ def _textured(evidence: ObjectEvidence) -> NDArray[np.float64]:
 def _relative(
     evidence: ObjectEvidence,
     values: NDArray[np.float64],
-    prior: tuple[float, float, float],
+    prior: tuple[float, float],
     is_known: NDArray[np.bool_] | None = None,
+    *,
+    may_widen: bool = True,
 ) -> NDArray[np.float64]:
-    """Values in robust spreads from the unchanged objects of these visits.
+    """Values in spreads from the middle of these visits' objects, most of which are unchanged.
 
     Args:
-        prior: median and spread to start from, and the least spread.
+        prior: median to start from, and spread.
         is_known: where a value exists; elsewhere the outcome is 0 (no evidence).
+        may_widen: objects of noisier visits than those of development scatter more: take their spread.
     """
     known = evidence.compared_count > 0 if is_known is None else is_known & (evidence.compared_count > 0)
     reference = known & (evidence.seen_through < _REFERENCE_SEEN_THROUGH)
     reference &= evidence.compared_count >= _REFERENCE_VOXELS
     reference[:1] = False
-    centre, spread, least = prior
+    centre, spread = prior
     count = int(reference.sum())
     if count:
         own = float(np.median(values[reference]))
-        own_spread = 1.48 * float(np.median(np.abs(values[reference] - own)))
+        # Where many objects changed, the upper side of the values is theirs.
+        below = own - values[reference & (values <= own)]
         share = count / (count + _PRIOR_OBJECTS)
-        centre, spread = share * own + (1 - share) * centre, share * own_spread + (1 - share) * spread
-    return np.where(known, np.clip((values - centre) / max(spread, least), _CLIP_LOW, _CLIP_HIGH), 0.0)
+        centre = share * own + (1 - share) * centre
+        if may_widen:
+            spread = max(spread, share * 1.48 * float(np.median(below)) + (1 - share) * spread)
+    return np.where(known, np.clip((values - centre) / spread, _CLIP_LOW, _CLIP_HIGH), 0.0)

@@ -20,6 +20,7 @@ from pipeline.change.observation import Observation
 from pipeline.change.observe import MutualObservation
 from pipeline.correspondence.compare import Comparison, VisitImages
 from pipeline.correspondence.heatmaps import change_of_similarity
+from pipeline.correspondence.pattern import PatternAgreement
 from pipeline.correspondence.place_similarity import PlaceSimilarity
 from pipeline.perception.protocols import FeatureExtractor
 from pipeline.settings import Settings
@@ -48,6 +49,7 @@ def decide(
     current: VisitImages,
     observation: MutualObservation,
     comparison: Comparison,
+    patterns: tuple[list[PatternAgreement], list[PatternAgreement]],
     extractor: FeatureExtractor,
     settings: Settings,
     on_submap: Callable[[int], None],
@@ -58,6 +60,7 @@ def decide(
     search = _Search(previous, current, extractor, comparison.light, settings)
     seen_so_far = Observation(len(previous.geometry.surface.points_world))
     similarity = (PlaceSimilarity.empty(previous.objects.count), PlaceSimilarity.empty(current.objects.count))
+    pattern = (PatternAgreement.empty(previous.objects.count), PatternAgreement.empty(current.objects.count))
     last_keyframe = _last_keyframes(current)
     decisions: list[Decision] = []
     for submap, local in enumerate(comparison.evidence):
@@ -65,13 +68,20 @@ def decide(
         seen_so_far.add_sparse(observation.by_submap[submap])
         similarity[0].merge(comparison.similarity0[submap])
         similarity[1].merge(comparison.similarity1[submap])
+        for so_far, added in zip(pattern, patterns, strict=True):
+            so_far.add(added[submap])
         is_met = current.geometry.first_keyframe <= last_keyframe[submap]
         dissimilarity = [change_of_similarity(s.mean, extractor.similarity) for s in similarity]
         evidence0, scale0 = _visit_evidence(
-            previous, seen_so_far, ~observation.is_noise0, dissimilarity[0], settings
+            previous, seen_so_far, ~observation.is_noise0, dissimilarity[0], pattern[0], settings
         )
         evidence1, scale1 = _visit_evidence(
-            current, observation.of_current, is_met & ~observation.is_noise1, dissimilarity[1], settings
+            current,
+            observation.of_current,
+            is_met & ~observation.is_noise1,
+            dissimilarity[1],
+            pattern[1],
+            settings,
         )
         if settings.change.rule == "paper":
             decision = decide_by_association(
@@ -113,6 +123,7 @@ def _visit_evidence(
     seen: Observation,
     is_met: NDArray[np.bool_],
     dissimilarity: NDArray[np.float64],
+    pattern: PatternAgreement,
     settings: Settings,
 ) -> tuple[VisitEvidence, float]:
     surface = visit.geometry.surface
@@ -134,6 +145,7 @@ def _visit_evidence(
         surface.normals_world,
         surface.points_world,
         dissimilarity,
+        pattern,
     )
     log_odds = change_log_odds(evidence, appearance.scale, settings.change)
     return VisitEvidence(evidence, log_odds, evidence.voxel_count > 0), appearance.scale

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.change.appearance import MIN_COMPARED_VOXELS, AppearanceResidual
+from pipeline.correspondence.pattern import PatternAgreement
 
 # Residuals beyond this many spreads of the pair of visits, and beyond this, belong to another surface.
 TAIL_SPREADS = 3.0
@@ -28,6 +29,9 @@ _TABLE = (
     "texture",
     "texture_correlation",
     "dissimilarity",
+    "pattern_pixels",
+    "pattern_correlation",
+    "pattern_lost",
     "log_odds",
 )
 
@@ -48,6 +52,9 @@ class ObjectEvidence:
         centroid_world: (K + 1, 3) metres.
         dissimilarity: how unlike the object's patches are to those at the same place in the other visit, on
             the scale of the semantic heatmap (log odds); NaN where no keyframe compared it.
+        pattern_pixels: pixels of all compared keyframes that show a pattern on the object.
+        pattern_correlation: mean local correlation of the pattern in the two visits; NaN without pixels.
+        pattern_lost: share of the pattern that the other visit does not show; NaN without pixels.
     """
 
     voxel_count: NDArray[np.int64]
@@ -60,6 +67,9 @@ class ObjectEvidence:
     texture_correlation: NDArray[np.float64]
     centroid_world: NDArray[np.float64]
     dissimilarity: NDArray[np.float64]
+    pattern_pixels: NDArray[np.float64]
+    pattern_correlation: NDArray[np.float64]
+    pattern_lost: NDArray[np.float64]
 
     @classmethod
     def from_table(cls, rows: NDArray[np.void]) -> ObjectEvidence:
@@ -91,6 +101,7 @@ def object_evidence(
     normals_world: NDArray[np.float32],
     points_world: NDArray[np.float32],
     dissimilarity: NDArray[np.float64],
+    pattern: PatternAgreement,
 ) -> ObjectEvidence:
     """Gather the evidence of all instances.
 
@@ -102,6 +113,7 @@ def object_evidence(
         appearance: colour residual against the other visit.
         own_log_colours, normals_world, points_world: (M, 3) of the surface.
         dissimilarity: (K + 1,) from the compared keyframes.
+        pattern: how alike the compared keyframes' pixels are.
     """
     size = count + 1
     owner = np.where(is_met, instance_of_voxel, 0)
@@ -142,6 +154,9 @@ def object_evidence(
         texture_correlation=correlation,
         centroid_world=centroid,
         dissimilarity=dissimilarity,
+        pattern_pixels=pattern.weight,
+        pattern_correlation=pattern.mean_correlation,
+        pattern_lost=pattern.lost_share,
     )
 
 
