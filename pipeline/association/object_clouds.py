@@ -71,11 +71,19 @@ class ObjectClouds:
                 surface.points_world[own],
                 surface.normals_world[own],
                 geometry.log_colours[own] - self._log_gain,
+                surface.camera_positions_world,
             )
-        return self._thinned(np.concatenate(points), np.concatenate(colours), np.concatenate(voxels))
+        viewpoints = surface.camera_positions_world[views[pixels[views] > 0]]
+        return self._thinned(
+            np.concatenate(points), np.concatenate(colours), np.concatenate(voxels), viewpoints
+        )
 
     def _thinned(
-        self, points: NDArray[np.float32], log_colours: NDArray[np.float32], voxels: NDArray[np.int32]
+        self,
+        points: NDArray[np.float32],
+        log_colours: NDArray[np.float32],
+        voxels: NDArray[np.int32],
+        viewpoints: NDArray[np.floating],
     ) -> ObjectCloud:
         """Mean point and colour of each cell, in the order of the cells."""
         cells = np.floor(points / self.cell_m).astype(np.int64)
@@ -87,4 +95,4 @@ class ObjectClouds:
             sums[:, column] = np.bincount(cell_of_point, values[:, column], len(count))
         means = sums / count[:, None]
         normals = means[:, 6:] / np.maximum(np.linalg.norm(means[:, 6:], axis=1, keepdims=True), 1e-9)
-        return ObjectCloud(means[:, :3], normals, means[:, 3:6])
+        return ObjectCloud(means[:, :3], normals, means[:, 3:6], viewpoints)

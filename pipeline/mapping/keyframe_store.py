@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.store.files import write_array, writing
+from pipeline.store.files import read_npy, write_array, writing
 
 MAX_STORED_DEPTH_M = 65.0
 
@@ -40,15 +40,15 @@ class KeyframeStore:
 
     def depth(self, k: int) -> NDArray[np.float32]:
         """(h, w) metres, 0 = no measurement."""
-        return np.load(self._path("depth", k), allow_pickle=False).astype(np.float32) * np.float32(1e-3)
+        return read_npy(self._path("depth", k)).astype(np.float32) * np.float32(1e-3)
 
     def rgb(self, k: int) -> NDArray[np.uint8]:
         """(h, w, 3) slightly blurred colour of the strided pixels."""
-        return np.load(self._path("rgb", k), allow_pickle=False)
+        return read_npy(self._path("rgb", k))
 
     def voxels(self, k: int) -> NDArray[np.int32]:
         """(h, w) surface voxel of each pixel, -1 = none."""
-        raw = np.load(self._path("voxels", k), allow_pickle=False)
+        raw = read_npy(self._path("voxels", k))
         if self.remap is None:
             return raw
         return np.where(raw >= 0, self.remap[np.maximum(raw, 0)], -1).astype(np.int32)

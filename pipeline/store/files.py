@@ -9,7 +9,9 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from io import BytesIO
 from pathlib import Path
+from threading import Lock
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -31,6 +33,10 @@ _HINTS = {
     errno.EEXIST: ("a file is in the way", "choose another path"),
     errno.ENAMETOOLONG: ("the name is too long", "choose a shorter one"),
 }
+
+# Headers are parsed by ast.literal_eval, which before Python 3.11.8 fails now and then when several threads
+# use it at once (cpython issue 106905).
+_HEADER = Lock()
 
 
 def storage_error(path: Path, error: OSError) -> StorageError:
@@ -72,6 +78,20 @@ def write_bytes(path: Path, content: bytes) -> None:
     """Write a whole file atomically."""
     with atomic_file(path) as file:
         file.write(content)
+
+
+def read_npy(path: Path, *, mmap: bool = False) -> NDArray[Any]:
+    """An ``.npy`` file, read or memory-mapped; any thread may call it.
+
+    Raises:
+        OSError, ValueError, EOFError: as ``numpy.load``.
+    """
+    if mmap:
+        with _HEADER:
+            return np.load(path, mmap_mode="r", allow_pickle=False)
+    content = BytesIO(path.read_bytes())
+    with _HEADER:
+        return np.load(content, allow_pickle=False)
 
 
 def write_array(path: Path, array: NDArray[Any]) -> None:

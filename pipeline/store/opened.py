@@ -22,6 +22,7 @@ from pipeline.result import (
     ScoreMatrix,
     SessionResult,
 )
+from pipeline.store.files import read_npy
 from pipeline.store.layout import MAP_ARRAYS, SCHEMA_VERSION, SCORE_ARRAYS, ResultLayout
 from pipeline.store.records import keyframe_from_dict, objects_from_dict, replaced_from_dict
 
@@ -43,7 +44,7 @@ def read_json(path: Path) -> Any:
 def read_array(path: Path, *, mmap: bool = True) -> NDArray[Any]:
     """An ``.npy`` of a result, memory-mapped read-only; ``ResultError`` when missing or truncated."""
     try:
-        return np.load(path, mmap_mode="r" if mmap else None, allow_pickle=False)
+        return read_npy(path, mmap=mmap)
     except FileNotFoundError:
         raise ResultError(f"{path} is missing", f"the result is not complete, {_RUN_AGAIN}") from None
     except (OSError, ValueError, EOFError):
