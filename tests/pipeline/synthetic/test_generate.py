@@ -13,7 +13,7 @@ from pipeline.errors import InputError, OasisError, StorageError
 from pipeline.ply import NOT_SCORED, read_ply
 from pipeline.progress import ProgressEvent
 from pipeline.result import ChangeLabel
-from pipeline.synthetic import SCENES, build_scene, generate
+from pipeline.synthetic import HELD_OUT_SCENES, SCENES, build_scene, generate
 
 SMALL = (160, 120)
 FRAMES = 8
@@ -24,7 +24,7 @@ def digest(folder: Path) -> dict[str, str]:
     return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
-@pytest.fixture(scope="module", params=SCENES)
+@pytest.fixture(scope="module", params=SCENES + HELD_OUT_SCENES)
 def made(request, tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("synthetic") / request.param
     generate(request.param, out, 5, FRAMES, size=SMALL)
