@@ -137,7 +137,7 @@ def test_runs_as_a_module() -> None:
         (
             ["generate", "moon", "out", "--seed", "1"],
             "oasisview generate: argument SCENE: invalid choice: 'moon' (choose from 'office', 'carpark', "
-            "'warehouse', 'market'): see `oasisview generate --help`",
+            "'warehouse', 'market', 'hillside', 'tunnel'): see `oasisview generate --help`",
         ),
         (["batch", "gone.csv"], "oasisview: there is no file gone.csv: check the path"),
     ],
