@@ -44,17 +44,20 @@ class Limits:
         tau_sigma: least share of matching patches; tau_s: least match quality.
         tau_d_m: largest displacement of an object that stayed, metres.
         nu_min: least share of a place that the other visit must have looked at.
+        method: what decided: this engine or a baseline, which has limits of its own.
     """
 
     tau_sigma: float
     tau_s: float
     tau_d_m: float
     nu_min: float
+    method: str = "oasis"
 
     @classmethod
     def of(cls, result: Result) -> Limits:
         """The limits of a result; what an old manifest does not hold takes the documented default."""
-        change = result.manifest.get("settings", {}).get("change", {})
+        settings = result.manifest.get("settings", {})
+        change = settings.get("change", {})
         default = Settings().change
         matrix = result.score_matrix
         return cls(
@@ -62,6 +65,7 @@ class Limits:
             tau_s=float(matrix.tau_s),
             tau_d_m=float(change.get("tau_d_m", default.tau_d_m)),
             nu_min=float(change.get("nu_min", default.nu_min)),
+            method=str(settings.get("run", {}).get("method", "oasis")),
         )
 
 
@@ -128,6 +132,11 @@ def queue_fact(item: MapObject, label: ChangeLabel) -> str:
 
 def why(item: MapObject, limits: Limits) -> str:
     """Why the machine gave this object its label."""
+    if limits.method != "oasis":
+        return (
+            f"The baseline {limits.method} says so. It does not decide by the patch matches shown here: "
+            "they are what the images say."
+        )
     match item.label:
         case ChangeLabel.STATIC:
             return _why_static(item, limits)

@@ -11,13 +11,15 @@ Nothing here is beyond knowing: of things that look the same, at most one change
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from pipeline.synthetic.footprint import Area, Footprint, footprint, is_free
+from pipeline.synthetic.footprint import Footprint, footprint, is_free
+from pipeline.synthetic.mix import Mix
 from pipeline.synthetic.props import Arrangement, Prop, Workshop, reprinted
 from pipeline.synthetic.shapes import pose
+from pipeline.synthetic.spots import Reach, Spot
 from pipeline.synthetic.world import Pose
 
 _MODES = {"carried": 0.5, "swapped": 0.16, "shifted": 0.2, "turned": 0.14}
@@ -25,85 +27,6 @@ _SUCCESSORS = {"reprinted": 0.35, "look-alike": 0.35, "different": 0.3}
 _SLACK_M = 0.012  # boxes around things are larger than the things
 _LEAST_TURN_RAD = np.deg2rad(28.0)
 _TRIES = 24
-
-
-@dataclass(frozen=True)
-class Spot:
-    """A place with the thing that stands there before anything happens.
-
-    Attributes:
-        pose: T_world_object.
-        prop: the thing.
-        area: where the thing may be put nearby; None = it can only be turned or taken away.
-        group: things are carried to places of the same group only.
-        weight: how likely it is to be moved, relative to others.
-    """
-
-    pose: Pose
-    prop: Prop
-    area: Area | None = None
-    group: str = ""
-    weight: float = 1.0
-
-
-@dataclass(frozen=True)
-class Mix:
-    """How many things meet each fate; the rest stays.
-
-    ``spare`` places stay empty for what is moved; ``twins`` are things alike in shape and print, one of
-    each pair moved, and ``reprints`` things alike in shape only.
-    """
-
-    moved: int
-    spare: int
-    appeared: int
-    disappeared: int
-    replaced: int
-    jolted: int = 0
-    twins: int = 0
-    reprints: int = 0
-
-
-@dataclass(frozen=True)
-class Reach:
-    """How far things go: short moves (metres, least and most), and what replaces a thing off its place."""
-
-    shift_m: tuple[float, float] = (0.08, 0.45)
-    nudge_m: float = 0.007
-    nudge_rad: float = 0.03
-    footprint_scale: float = 1.0
-
-
-def draw_mix(
-    shop: Workshop,
-    count: int,
-    many: bool,
-    shares: tuple[float, float, float],
-    spare: float = 0.6,
-    jolted: int = 0,
-) -> Mix:
-    """Fates of ``count`` things.
-
-    Args:
-        shop: source of the numbers.
-        count: things in all.
-        many: whether this is a scene of many moves (13 to 17 rather than 3 to 9).
-        shares: appeared, disappeared, replaced, of all things.
-        spare: places left empty, per moved thing.
-        jolted: things moved by less than counts as a move.
-    """
-    moved = min(shop.count(13, 17) if many else shop.count(3, 9), count // 2)
-    appeared, disappeared, replaced = (max(1, round(share * count)) for share in shares)
-    return Mix(
-        moved=moved,
-        spare=round(spare * moved),
-        appeared=appeared,
-        disappeared=disappeared,
-        replaced=replaced,
-        jolted=jolted,
-        twins=shop.count(1, 2) if moved > 2 else 0,
-        reprints=shop.count(2, 4),
-    )
 
 
 class Rearrangement:

@@ -24,6 +24,7 @@ class Prop:
         symmetry_order: of shape and print about the z axis: 1 = none, n = n-fold, 0 = any angle.
         tips: whether it may be found lying on its side.
         plain: whether nothing tells it from its look-alikes.
+        sway: for what is soft: its shape at another moment, though nobody touched it.
     """
 
     class_name: str
@@ -32,6 +33,7 @@ class Prop:
     symmetry_order: int = 1
     tips: bool = False
     plain: bool = False
+    sway: Callable[[], Mesh] | None = None
 
     @property
     def height(self) -> float:
@@ -95,6 +97,7 @@ class Entry:
     current: Pose | None
     successor: int | None = None
     story: str = ""
+    mesh_current: Mesh | None = None
 
 
 @dataclass
@@ -103,9 +106,9 @@ class Arrangement:
 
     entries: list[Entry] = field(default_factory=list)
 
-    def keep(self, prop: Prop, pose: Pose) -> None:
-        """The same thing at the same place in both visits."""
-        self.entries.append(Entry(prop, pose, pose))
+    def keep(self, prop: Prop, pose: Pose, mesh_current: Mesh | None = None) -> None:
+        """The same thing at the same place in both visits; ``mesh_current`` where it hangs otherwise now."""
+        self.entries.append(Entry(prop, pose, pose, mesh_current=mesh_current))
 
     def vanish(self, prop: Prop, pose: Pose) -> None:
         """There in the previous visit only."""
@@ -138,6 +141,7 @@ class Arrangement:
                 replaced_by=None if entry.successor is None else int(ids[entry.successor]),
                 symmetry_order=entry.prop.symmetry_order,
                 story=entry.story,
+                mesh_current=entry.mesh_current,
             )
             for number, entry in zip(ids, self.entries, strict=True)
         ]

@@ -191,7 +191,10 @@ def assemble(
 
 
 def motions(scene: SyntheticScene, truth: LabelledPoints) -> dict[str, Any]:
-    """What ``gt.json`` holds: how each object labelled moved got from one place to the other.
+    """What ``gt.json`` holds: how each object seen in both visits got from one pose to the other.
+
+    Objects labelled moved, and the static ones that were jolted by less than counts as a move; a static
+    object without a motion did not move at all.
 
     Returns:
         ``schema_version`` 1; ``motions``: of each, ``object_id``, ``T_world_motion`` (4x4, rows, metres; a
@@ -199,7 +202,8 @@ def motions(scene: SyntheticScene, truth: LabelledPoints) -> dict[str, Any]:
         ``symmetry_order`` (1 = none, n = n-fold about the object's up axis, 0 = any angle); ``kinds``: how
         each changed object changed, by object id (see ``changes``).
     """
-    moved = set(truth.object_id[truth.label == ChangeLabel.MOVED].tolist())
+    shown = np.isin(truth.label, (ChangeLabel.MOVED, ChangeLabel.STATIC))
+    seen = [set(truth.object_id[shown & (truth.session == visit)].tolist()) for visit in (0, 1)]
     return {
         "schema_version": 1,
         "motions": [
@@ -209,7 +213,7 @@ def motions(scene: SyntheticScene, truth: LabelledPoints) -> dict[str, Any]:
                 "symmetry_order": thing.symmetry_order,
             }
             for thing in scene.objects
-            if thing.object_id in moved
+            if thing.object_id in seen[0] & seen[1] and (thing.is_moved or thing.story == "jolted")
         ],
         "kinds": {str(thing.object_id): thing.story or thing.fate for thing in scene.objects},
     }

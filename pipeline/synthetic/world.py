@@ -27,6 +27,7 @@ class SceneObject:
         replaced_by: the object that took its place in visit 1.
         symmetry_order: of shape and print together: 1 = none, n = n-fold about its z axis, 0 = any angle.
         story: how it changed, for people and for tables by kind of change (see ``changes``).
+        mesh_current: its shape in visit 1 where that differs: cloth in the wind. Still the same thing.
     """
 
     object_id: int
@@ -36,6 +37,7 @@ class SceneObject:
     replaced_by: int | None = None
     symmetry_order: int = 1
     story: str = ""
+    mesh_current: Mesh | None = None
 
     @property
     def is_moved(self) -> bool:
@@ -131,6 +133,7 @@ class SyntheticScene:
         for thing in self.objects:
             T_world_object = thing.poses[visit]
             if T_world_object is not None:
-                meshes.append(thing.mesh.placed(T_world_object))
+                mesh = thing.mesh_current if visit and thing.mesh_current is not None else thing.mesh
+                meshes.append(mesh.placed(T_world_object))
                 owners.append(np.full(len(thing.mesh.tile), thing.object_id, dtype=np.int32))
         return join(meshes), np.concatenate(owners)

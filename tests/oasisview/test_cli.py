@@ -137,7 +137,7 @@ def test_runs_as_a_module() -> None:
         (
             ["generate", "moon", "out", "--seed", "1"],
             "oasisview generate: argument SCENE: invalid choice: 'moon' (choose from 'office', 'carpark', "
-            "'warehouse', 'market'): see `oasisview generate --help`",
+            "'warehouse', 'market', 'hillside', 'tunnel'): see `oasisview generate --help`",
         ),
         (["batch", "gone.csv"], "oasisview: there is no file gone.csv: check the path"),
     ],
@@ -221,8 +221,8 @@ def test_settings_are_listed_with_units_and_symbols(capsys: pytest.CaptureFixtur
 
 def test_what_help_repeats_is_what_the_packages_offer() -> None:
     from oasisview.export import FORMATS
-    from pipeline.synthetic import SCENES, generate
+    from pipeline.synthetic import HELD_OUT_SCENES, SCENES, generate
 
     assert set(export.FORMATS) == set(FORMATS)
-    assert options.SCENES == SCENES
+    assert options.SCENES == SCENES and options.HELD_OUT_SCENES == HELD_OUT_SCENES
     assert inspect.signature(generate).parameters["frames"].default == options.SCENE_FRAMES

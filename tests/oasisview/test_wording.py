@@ -34,6 +34,12 @@ def test_why_in_plain_words(small_result: Result, object_id: int, said: str) -> 
     assert said in wording.why(small_result.object(object_id), LIMITS)
 
 
+def test_baseline_gets_no_reasons_that_are_not_its_own(small_result: Result) -> None:
+    said = wording.why(small_result.object(1), replace(LIMITS, method="conceptgraphs"))
+    assert said.startswith("The baseline conceptgraphs says so.")
+    assert Limits.of(small_result).method == "oasis"
+
+
 def test_why_unknown_names_what_is_missing(small_result: Result) -> None:
     item = replace(small_result.object(3), label=ChangeLabel.UNKNOWN, coverage=0.9, sigma=0.2, s_bar=0.9)
     assert "only 20% of its patches do; 30% are needed" in wording.why(item, LIMITS)

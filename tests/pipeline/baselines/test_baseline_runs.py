@@ -11,12 +11,13 @@ import pytest
 from fixture_scene import OBJECTS
 
 from oasisview.commands.options import METHODS as COMMAND_METHODS
+from pipeline.baselines import findings
 from pipeline.baselines.findings import NOT_MET
 from pipeline.methods import METHODS, chosen_method
 from pipeline.result import ChangeLabel, Result
 from pipeline.settings import RunSettings, Settings
 from pipeline.store import open_result
-from pipeline.system import run_key
+from pipeline.system import run, run_key
 
 BASELINES = ("geometric", "conceptgraphs", "wheres-my-glasses")
 OBJECT_METHODS = BASELINES[1:]
@@ -86,6 +87,39 @@ def test_result_can_be_evaluated_and_exported(
     path = result_of(method).path
     assert main(["export", str(path), "--format", "csv", "-o", str(tmp_path / "o.csv")]) == 0
     assert len((tmp_path / "o.csv").read_text().splitlines()) > len(result_of(method).objects)
+
+
+@pytest.mark.parametrize("method", BASELINES)
+def test_viewer_says_who_decided(method: str, result_of: Callable[[str], Result]) -> None:
+    from oasisview.wording import Limits, why
+
+    result = result_of(method)
+    assert f"The baseline {method} says so" in why(result.objects[0], Limits.of(result))
+
+
+@pytest.mark.parametrize("method", ("geometric", "wheres-my-glasses"))
+def test_interrupted_baseline_goes_on_from_its_checkpoints_to_the_same_bytes(
+    method: str,
+    result_of: Callable[[str], Result],
+    hall_archives: tuple[Path, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    settings = Settings.from_dict(dict(result_of(method).manifest["settings"]))
+    output, stages = tmp_path / "hall.oasis", set()
+
+    def power_cut(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(findings, "find_replaced", power_cut)
+        with pytest.raises(KeyboardInterrupt):
+            run(*hall_archives, settings=settings, output=output)
+    resumed = run(*hall_archives, settings=settings, output=output, report=lambda e: stages.add(e.stage))
+    assert stages == {"open", "decide", "write"}
+    assert resumed.objects == result_of(method).objects
+    for ours, theirs in zip(resumed.sessions, result_of(method).sessions, strict=True):
+        assert (np.asarray(ours.object_ids) == np.asarray(theirs.object_ids)).all()
 
 
 def test_geometric_finds_what_came_and_went_and_knows_no_identity(result_of: Callable[[str], Result]) -> None:
