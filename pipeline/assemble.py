@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.association.registration import rotation_angle
 from pipeline.change.change_score import appearance_change
 from pipeline.change.decide import Conclusion
 from pipeline.change.decision import NOT_MET, Decision, VisitEvidence
@@ -167,9 +168,13 @@ def _object(
         s_bar = float(scores.s_bar[pair])
         case = association.case(*pair)
     appearance = appearance_change(visits[axis].objects)[instance]
+    motion = _motion(final, axis, instance) if partner else None
     displacement = None
     if len(sightings) == 2:
         before, after = (np.array(seen.centroid_world_m) for seen in sightings)
+        if motion is not None:
+            # Of a thing of which other parts were seen, the centroids are those of other points.
+            after = motion[:3, :3] @ before + motion[:3, 3]
         displacement = _rounded(float(np.linalg.norm(after - before)))
     return MapObject(
         object_id=object_id,
@@ -180,7 +185,7 @@ def _object(
         s_bar=_rounded(s_bar),
         coverage=min(seen.coverage for seen in sightings),
         displacement_m=displacement,
-        rotation_rad=None,
+        rotation_rad=None if motion is None else _rounded(rotation_angle(motion[:3, :3])),
         seen_through=_rounded(visits[axis].objects.seen_through[instance]),
         appearance_change=None if np.isnan(appearance) else _rounded(appearance),
         decided_in_submap=settled.get(object_id),
@@ -188,7 +193,15 @@ def _object(
         replaced_by=None,
         replaces=None,
         sightings=sightings,
+        T_world_motion=None if motion is None else tuple(tuple(map(_rounded, row)) for row in motion),
     )
+
+
+def _motion(decision: Decision, axis: int, instance: int) -> NDArray[np.float64] | None:
+    for identity in decision.identities:
+        if instance == (identity.previous, identity.current)[axis]:
+            return identity.T_world_motion
+    return None
 
 
 def _replaced(objects: list[MapObject], settings: Settings) -> tuple[ReplacedEvent, ...]:

@@ -74,8 +74,8 @@ class Registration:
 
     Attributes:
         T_world_motion: (4, 4), p_current = T p_previous, world frame.
-        overlap_previous, overlap_current: of either cloud's points that face the other's viewpoints, the share
-            that lies on the other's surface. What faces away could not be seen: it speaks neither way.
+        overlap_previous, overlap_current: of either cloud's points that face the other's viewpoints, the
+            share that lies on the other's surface. What faces away could not be seen: it speaks neither way.
         shared: share of the smaller cloud's points that lie on the other's surface.
         likelihood: mean log-likelihood ratio of the colours there, same pattern against any pattern of these
             colours; 0 where the clouds have one colour each.
@@ -104,7 +104,7 @@ class Registration:
 
     @property
     def agreement(self) -> float:
-        """Orders registrations of the same clouds: nothing missing that was in view, the same pattern on it."""
+        """Orders registrations of the same clouds: nothing in view is missing, the pattern is the same."""
         return 2 * (self.overlap - 1) + (0.5 + self.likelihood) * min(1.0, self.shared / _ENOUGH_SHARED)
 
 
@@ -232,6 +232,11 @@ def rotation_about(axis: NDArray[np.floating], angle_rad: float) -> NDArray[np.f
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]], np.float64)
     return np.eye(3) + np.sin(angle_rad) * cross + (1 - np.cos(angle_rad)) * cross @ cross
+
+
+def rotation_angle(rotation: NDArray[np.floating]) -> float:
+    """Angle of a (3, 3) rotation, radians."""
+    return float(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1)))
 
 
 def _best_motions(

@@ -67,8 +67,11 @@ def change_log_odds(
 
 
 def change_features(evidence: ObjectEvidence) -> NDArray[np.float64]:
-    """(K + 1, 6) what the weights apply to: seen-through share, and in spreads from the unchanged objects:
-    patch dissimilarity, colour residual, lost texture correlation, share of unexplained colours, lost fine pattern."""
+    """(K + 1, 6) what the weights apply to.
+
+    Seen-through share, and in spreads from the unchanged objects: patch dissimilarity, colour residual, lost
+    texture correlation, share of unexplained colours, lost fine pattern.
+    """
     patches = _relative(
         evidence, np.nan_to_num(evidence.dissimilarity), _DISSIMILARITY, np.isfinite(evidence.dissimilarity)
     )

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.association.accumulation import AccumulatedAssociation
-from pipeline.association.reassociation import FoundAgain, find_again
-from pipeline.association.tokens import ObjectTokens
-from pipeline.change.appearance import appearance_residual
+from pipeline.association.moves import Candidate, ScoredMove, choose_moves, score_moves
+from pipeline.association.object_clouds import ObjectClouds
+from pipeline.association.registration import rotation_angle
+from pipeline.change.appearance import AppearanceResidual, appearance_residual
 from pipeline.change.change_score import change_log_odds
 from pipeline.change.colocation import nearest_instances, overlap_matrix
 from pipeline.change.decision import Decision, VisitEvidence, decide_by_association, decide_by_evidence
@@ -34,6 +35,7 @@ class Conclusion:
         decisions: one per submap of the current visit; the last one is final.
         previous, current: final evidence per object.
         association: accumulated scores of all pairs.
+        moves: pairs of changed objects that were laid over each other, chosen or not.
         appearance_scale: spread of the colour residual between the visits, log units: a quality figure.
     """
 
@@ -41,6 +43,7 @@ class Conclusion:
     previous: VisitEvidence
     current: VisitEvidence
     association: AccumulatedAssociation
+    moves: tuple[ScoredMove, ...]
     appearance_scale: float
 
 
@@ -56,12 +59,11 @@ def decide(
 ) -> Conclusion:
     """Accumulate the evidence submap by submap, and decide after each."""
     association = AccumulatedAssociation(previous.objects.count, current.objects.count, settings.association)
-    nearest0, nearest1 = _nearest(previous, current), _nearest(current, previous)
-    search = _Search(previous, current, extractor, comparison.light, settings)
     seen_so_far = Observation(len(previous.geometry.surface.points_world))
     similarity = (PlaceSimilarity.empty(previous.objects.count), PlaceSimilarity.empty(current.objects.count))
     pattern = (PatternAgreement.empty(previous.objects.count), PatternAgreement.empty(current.objects.count))
     last_keyframe = _last_keyframes(current)
+    evidence: list[tuple[VisitEvidence, VisitEvidence]] = []
     decisions: list[Decision] = []
     for submap, local in enumerate(comparison.evidence):
         association.add_submap(local)
@@ -72,10 +74,10 @@ def decide(
             so_far.add(added[submap])
         is_met = current.geometry.first_keyframe <= last_keyframe[submap]
         dissimilarity = [change_of_similarity(s.mean, extractor.similarity) for s in similarity]
-        evidence0, scale0 = _visit_evidence(
+        evidence0, appearance0 = _visit_evidence(
             previous, seen_so_far, ~observation.is_noise0, dissimilarity[0], pattern[0], settings
         )
-        evidence1, scale1 = _visit_evidence(
+        evidence1, appearance1 = _visit_evidence(
             current,
             observation.of_current,
             is_met & ~observation.is_noise1,
@@ -83,11 +85,20 @@ def decide(
             pattern[1],
             settings,
         )
+        evidence.append((evidence0, evidence1))
         if settings.change.rule == "paper":
-            decision = decide_by_association(
-                evidence0, evidence1, association, settings.change, is_final=submap + 1 == len(last_keyframe)
+            is_final = submap + 1 == len(last_keyframe)
+            decisions.append(
+                decide_by_association(evidence0, evidence1, association, settings.change, is_final=is_final)
             )
-        else:
+        on_submap(submap + 1)
+    moves: list[ScoredMove] = []
+    if settings.change.rule == "evidence":
+        find_moves = _Moves((previous, current), evidence[-1], appearance1.log_gain, settings)
+        moves = find_moves.scored
+        nearest0, nearest1 = _nearest(previous, current), _nearest(current, previous)
+        for submap, pair in enumerate(evidence):
+            is_met = current.geometry.first_keyframe <= last_keyframe[submap]
             overlap = overlap_matrix(
                 previous.objects.instance_of_voxel,
                 nearest0,
@@ -96,10 +107,9 @@ def decide(
                 np.where(is_met, nearest1, 0),
                 current.objects.count,
             )
-            decision = decide_by_evidence(evidence0, evidence1, overlap, association, search, settings.change)
-        decisions.append(decision)
-        on_submap(submap + 1)
-    return Conclusion(tuple(decisions), evidence0, evidence1, association, max(scale0, scale1))
+            decisions.append(decide_by_evidence(*pair, overlap, find_moves, settings))
+    scale = max(appearance0.scale, appearance1.scale)
+    return Conclusion(tuple(decisions), *evidence[-1], association, tuple(moves), scale)
 
 
 def _last_keyframes(visit: VisitImages) -> list[int]:
@@ -125,7 +135,7 @@ def _visit_evidence(
     dissimilarity: NDArray[np.float64],
     pattern: PatternAgreement,
     settings: Settings,
-) -> tuple[VisitEvidence, float]:
+) -> tuple[VisitEvidence, AppearanceResidual]:
     surface = visit.geometry.surface
     through = seen.is_seen_through(settings.observation)
     appearance = appearance_residual(
@@ -148,67 +158,56 @@ def _visit_evidence(
         pattern,
     )
     log_odds = change_log_odds(evidence, appearance.scale, settings.change)
-    return VisitEvidence(evidence, log_odds, evidence.voxel_count > 0), appearance.scale
+    return VisitEvidence(evidence, log_odds, evidence.voxel_count > 0), appearance
 
 
-class _Search:
-    """Re-association among objects that left their place; remembers tokens and sizes between submaps."""
+class _Moves:
+    """Moves between objects that changed by the end; scored once, then chosen anew after every submap."""
 
     def __init__(
         self,
-        previous: VisitImages,
-        current: VisitImages,
-        extractor: FeatureExtractor,
-        light: NDArray[np.float64] | None,
+        visits: tuple[VisitImages, VisitImages],
+        final: tuple[VisitEvidence, VisitEvidence],
+        log_gain: NDArray[np.float64],
         settings: Settings,
     ) -> None:
-        self._tokens = tuple(
-            ObjectTokens(
-                visit.objects.view_pixels,
-                visit.features,
-                lambda k, visit=visit: visit.objects.mask(visit.geometry, k),  # type: ignore[misc]
-            )
-            for visit in (previous, current)
-        )
-        self._visits = (previous, current)
-        self._extractor = extractor
-        self._light = light
         self._settings = settings
-        self._known_sizes: tuple[dict[int, NDArray[np.float64]], ...] = ({}, {})
-
-    def __call__(self, left: list[int], taken: list[int]) -> list[FoundAgain]:
-        sizes = tuple(
-            np.array([self._size_m(visit, instance) for instance in instances])
-            for visit, instances in enumerate((left, taken))
+        # Colours of the current visit are brought into the light of the previous one.
+        clouds = [
+            ObjectClouds(visit.geometry, visit.objects, gain)
+            for visit, gain in zip(visits, (np.zeros(3), -log_gain), strict=True)
+        ]
+        candidates = [
+            [
+                Candidate(
+                    int(instance),
+                    of_visit.of(int(instance)),
+                    float(evidence.objects.seen_through[instance]),
+                    int(evidence.objects.voxel_count[instance]),
+                )
+                for instance in np.flatnonzero(
+                    evidence.is_met & (evidence.log_odds > settings.moves.least_change_log_odds)
+                )
+                if instance > 0
+            ]
+            for of_visit, evidence in zip(clouds, final, strict=True)
+        ]
+        surface = visits[0].geometry.surface
+        self.scored = score_moves(
+            candidates[0], candidates[1], surface.up_world, clouds[0].cell_m, settings.moves
         )
-        return find_again(
-            left,
-            taken,
-            self._tokens[0],
-            self._tokens[1],
-            (sizes[0], sizes[1]),
-            self._extractor,
-            self._light,
-            self._settings.association,
-            self._settings.change.moved_size_ratio,
+        self._centroids = final[0].objects.centroid_world
+
+    def __call__(self, previous: set[int], current: set[int]) -> list[ScoredMove]:
+        return choose_moves(
+            self.scored,
+            lambda move: move.previous in previous and move.current in current and self._has_moved(move),
+            self._settings.moves,
         )
 
-    def _size_m(self, visit: int, instance: int) -> NDArray[np.float64]:
-        known = self._known_sizes[visit]
-        if instance not in known:
-            images = self._visits[visit]
-            surface = images.geometry.surface
-            points = surface.points_world[images.objects.instance_of_voxel == instance]
-            known[instance] = size_m(points, surface.up_world, surface.voxel_size_m)
-        return known[instance]
-
-
-def size_m(
-    points_world: NDArray[np.floating], up_world: NDArray[np.floating], least_m: float
-) -> NDArray[np.float64]:
-    """(2,) horizontal reach and height of points in metres; turning about gravity changes neither."""
-    height = points_world @ up_world
-    level = points_world - height[:, None] * up_world
-    reach = 2 * np.percentile(np.linalg.norm(level - level.mean(axis=0), axis=1), 95)
-    low, high = np.percentile(height, [2, 98])
-    return np.maximum([reach, high - low], least_m).astype(np.float64)
+    def _has_moved(self, move: ScoredMove) -> bool:
+        T = move.registration.T_world_motion
+        centroid = self._centroids[move.previous]
+        shift_m = float(np.linalg.norm(T[:3, :3] @ centroid + T[:3, 3] - centroid))
+        turn_deg = float(np.degrees(rotation_angle(T[:3, :3])))
+        return shift_m > self._settings.change.tau_d_m or turn_deg > self._settings.moves.min_rotation_deg

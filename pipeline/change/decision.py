@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from pipeline.association.accumulation import AccumulatedAssociation
-from pipeline.association.reassociation import FoundAgain
+from pipeline.association.moves import ScoredMove
 from pipeline.change.evidence import ObjectEvidence
 from pipeline.change.labels import labels_from_association
 from pipeline.result import ChangeLabel
-from pipeline.settings import ChangeSettings
+from pipeline.settings import ChangeSettings, Settings
 
 # Label code of an object that nobody has seen yet.
 NOT_MET = 255
@@ -47,11 +47,16 @@ class VisitEvidence:
 
 @dataclass(frozen=True)
 class Identity:
-    """A previous and a current instance (counted from 1) that are one object, and how sure that is."""
+    """A previous and a current instance (counted from 1) that are one object, and how sure that is.
+
+    Attributes:
+        T_world_motion: (4, 4), p_current = T p_previous; None where it was not estimated.
+    """
 
     previous: int
     current: int
     confidence: float
+    T_world_motion: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -71,8 +76,8 @@ class Decision:
     confidence1: NDArray[np.float64]
 
 
-# Looks for vacated previous instances among vacated current ones (both counted from 1).
-FindAgain = Callable[[list[int], list[int]], list[FoundAgain]]
+# Chooses moves among those between two sets of instances (counted from 1) that may have moved.
+FindMoves = Callable[[set[int], set[int]], list[ScoredMove]]
 
 
 def decide_by_association(
@@ -119,39 +124,58 @@ def decide_by_evidence(
     previous: VisitEvidence,
     current: VisitEvidence,
     overlap: NDArray[np.float64],
-    association: AccumulatedAssociation,
-    find_again: FindAgain,
-    settings: ChangeSettings,
+    find_moves: FindMoves,
+    settings: Settings,
 ) -> Decision:
     """Decide from what changed at each place.
 
     Args:
         previous, current: evidence of either visit.
         overlap: (n, m) voxel intersection over union of the objects' places.
-        association: the paper's association, for objects that both left their place.
-        find_again: re-association of what neither place nor association explains.
+        find_moves: finds objects that left their place at another one.
+        settings: of the run.
     """
     visits = (previous, current)
+    change = settings.change
     changed = [(visit.log_odds > 0) & visit.is_met for visit in visits]
     for of_visit in changed:
         of_visit[0] = False  # background is no object, however much of it looks changed
     labels = [
-        np.where(visit.objects.coverage >= settings.nu_min, ChangeLabel.STATIC, ChangeLabel.UNKNOWN)
+        np.where(visit.objects.coverage >= change.nu_min, ChangeLabel.STATIC, ChangeLabel.UNKNOWN)
         for visit in visits
     ]
     for visit, code in enumerate((ChangeLabel.DISAPPEARED, ChangeLabel.APPEARED)):
-        is_covered = visits[visit].objects.coverage >= settings.nu_min
+        is_covered = visits[visit].objects.coverage >= change.nu_min
         labels[visit][changed[visit] & is_covered] = code
-    confidence = [_confidence(visit, settings) for visit in visits]
+    confidence = [_confidence(visit, change) for visit in visits]
 
-    identities = _same_place(changed, overlap, previous, current, settings)
-    for identity in identities:
-        labels[0][identity.previous] = labels[1][identity.current] = ChangeLabel.STATIC
-    moved = _moves(changed, previous, current, association, find_again, settings)
+    may_move = [
+        set(
+            np.flatnonzero(
+                (visit.log_odds > settings.moves.least_change_log_odds)
+                & (visit.objects.coverage >= change.nu_min)
+                & visit.is_met
+            ).tolist()
+        )
+        - {0}
+        for visit in visits
+    ]
+    moved = tuple(
+        Identity(m.previous, m.current, _probability(m.log_odds), m.registration.T_world_motion)
+        for m in find_moves(may_move[0], may_move[1])
+    )
     for identity in moved:
         labels[0][identity.previous] = labels[1][identity.current] = ChangeLabel.MOVED
         confidence[0][identity.previous] = confidence[1][identity.current] = identity.confidence
+        changed[0][identity.previous] = changed[1][identity.current] = True
+    identities = _same_place(changed, overlap, previous, current, change)
+    for identity in identities:
+        labels[0][identity.previous] = labels[1][identity.current] = ChangeLabel.STATIC
     return _finished((*identities, *moved), visits, (labels[0], labels[1]), (confidence[0], confidence[1]))
+
+
+def _probability(log_odds: float) -> float:
+    return float(1.0 / (1.0 + np.exp(-np.clip(log_odds, -30, 30))))
 
 
 def _same_place(
@@ -174,39 +198,6 @@ def _same_place(
         for row, column in zip(rows, columns, strict=True)
         if shared[row, column] > settings.same_place_overlap
     )
-
-
-def _moves(
-    changed: list[NDArray[np.bool_]],
-    previous: VisitEvidence,
-    current: VisitEvidence,
-    association: AccumulatedAssociation,
-    find_again: FindAgain,
-    settings: ChangeSettings,
-) -> tuple[Identity, ...]:
-    """Objects that left one place and took another: both places were seen to be empty in the other visit."""
-    vacated = [
-        set(np.flatnonzero(c & (v.objects.seen_through >= settings.vacated_share)).tolist())
-        for c, v in zip(changed, (previous, current), strict=True)
-    ]
-
-    def displacement_m(previous_instance: int, current_instance: int) -> float:
-        before = previous.objects.centroid_world[previous_instance]
-        return float(np.linalg.norm(current.objects.centroid_world[current_instance] - before))
-
-    moves = [
-        Identity(row + 1, column + 1, float(association.evidence.s_bar[row, column]))
-        for row, column in association.pairs()
-        if row + 1 in vacated[0] and column + 1 in vacated[1]
-    ]
-    left = sorted(vacated[0] - {move.previous for move in moves})
-    taken = sorted(vacated[1] - {move.current for move in moves})
-    if left and taken:
-        moves += [
-            Identity(found.previous, found.current, found.sigma * found.s_bar)
-            for found in find_again(left, taken)
-        ]
-    return tuple(m for m in moves if displacement_m(m.previous, m.current) > settings.tau_d_m)
 
 
 def _confidence(visit: VisitEvidence, settings: ChangeSettings) -> NDArray[np.float64]:

@@ -154,7 +154,7 @@ def object_evidence(
         texture_correlation=correlation,
         centroid_world=centroid,
         dissimilarity=dissimilarity,
-        pattern_pixels=pattern.weight,
+        pattern_pixels=pattern.weight.copy(),  # goes on growing
         pattern_correlation=pattern.mean_correlation,
         pattern_lost=pattern.lost_share,
     )

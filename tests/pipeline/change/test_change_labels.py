@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 import pytest
+from pipeline.association.reassociation import FoundAgain
 
 from pipeline.association.accumulation import AccumulatedAssociation
 from pipeline.association.aggregation import MatchEvidence
-from pipeline.association.reassociation import FoundAgain
 from pipeline.change.decision import (
     NOT_MET,
     Decision,
