@@ -58,9 +58,10 @@ class OasisMethod:
         conclusion = decide(
             *visits, mapped.observation, comparison, patterns, mapped.extractor, settings, on_submap
         )
+        final = conclusion.decisions[-1]
         tables = [
-            evidence.objects.table(evidence.log_odds)
-            for evidence in (conclusion.previous, conclusion.current)
+            evidence.objects.table(log_odds=final.log_odds[visit], move_log_odds=final.move_log_odds[visit])
+            for visit, evidence in enumerate((conclusion.previous, conclusion.current))
         ]
         quality = {
             "appearance_scale_log": round(conclusion.appearance_scale, 4),

@@ -256,6 +256,27 @@ class ChangeSettings:
 
 
 @dataclass(frozen=True)
+class ConfidenceSettings:
+    """How likely labels are right; from benchmarks/fit_confidence.py on scenes that no table reports."""
+
+    static_bias: float = setting(0.0, "static: log odds that such a label is right, before any evidence")
+    static_change: float = setting(0.5, "static: log odds per log odds of the change")
+    static_coverage: float = setting(0.0, "static: log odds for full coverage")
+    static_voxels: float = setting(0.0, "static: log odds per tenfold number of voxels")
+    static_move: float = setting(0.0, "static: log odds per log odds of the likeliest move")
+    changed_bias: float = setting(0.0, "changed: log odds that such a label is right, before any evidence")
+    changed_change: float = setting(0.5, "changed: log odds per log odds of the change")
+    changed_coverage: float = setting(0.0, "changed: log odds for full coverage")
+    changed_voxels: float = setting(0.0, "changed: log odds per tenfold number of voxels")
+    changed_move: float = setting(0.0, "changed: log odds per log odds of the likeliest move")
+    moved_bias: float = setting(0.0, "moved: log odds that such a label is right, before any evidence")
+    moved_change: float = setting(0.0, "moved: log odds per log odds of the change")
+    moved_coverage: float = setting(0.0, "moved: log odds for full coverage")
+    moved_voxels: float = setting(0.0, "moved: log odds per tenfold number of voxels")
+    moved_move: float = setting(0.5, "moved: log odds per log odds of the likeliest move")
+
+
+@dataclass(frozen=True)
 class BaselineSettings:
     """The baselines of the paper; values are the published ones unless the help says otherwise."""
 
@@ -329,6 +350,7 @@ class Settings:
     association: AssociationSettings = field(default_factory=AssociationSettings)
     moves: MoveSettings = field(default_factory=MoveSettings)
     change: ChangeSettings = field(default_factory=ChangeSettings)
+    confidence: ConfidenceSettings = field(default_factory=ConfidenceSettings)
     baseline: BaselineSettings = field(default_factory=BaselineSettings)
 
     def to_dict(self) -> dict[str, dict[str, Any]]:

@@ -15,6 +15,7 @@ from pipeline.association.registration import rotation_angle
 from pipeline.change.appearance import AppearanceResidual, appearance_residual
 from pipeline.change.change_score import change_log_odds
 from pipeline.change.colocation import nearest_instances, overlap_matrix
+from pipeline.change.confidence import NO_MOVE_LOG_ODDS
 from pipeline.change.decision import Decision, VisitEvidence, decide_by_association, decide_by_evidence
 from pipeline.change.evidence import object_evidence
 from pipeline.change.observation import Observation
@@ -107,7 +108,7 @@ def decide(
                 np.where(is_met, nearest1, 0),
                 current.objects.count,
             )
-            decisions.append(decide_by_evidence(*pair, overlap, find_moves, settings))
+            decisions.append(decide_by_evidence(*pair, overlap, find_moves, find_moves.likeliest, settings))
     scale = max(appearance0.scale, appearance1.scale)
     return Conclusion(tuple(decisions), *evidence[-1], association, tuple(moves), scale)
 
@@ -197,6 +198,13 @@ class _Moves:
             candidates[0], candidates[1], surface.up_world, clouds[0].cell_m, settings.moves
         )
         self._centroids = final[0].objects.centroid_world
+        self.likeliest = (
+            np.full(len(final[0].log_odds), NO_MOVE_LOG_ODDS),
+            np.full(len(final[1].log_odds), NO_MOVE_LOG_ODDS),
+        )
+        for move in self.scored:
+            for of_visit, instance in zip(self.likeliest, (move.previous, move.current), strict=True):
+                of_visit[instance] = max(of_visit[instance], move.log_odds)
 
     def __call__(self, previous: set[int], current: set[int]) -> list[ScoredMove]:
         return choose_moves(

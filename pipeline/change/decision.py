@@ -16,11 +16,15 @@ from scipy.optimize import linear_sum_assignment
 
 from pipeline.association.accumulation import AccumulatedAssociation
 from pipeline.association.moves import ScoredMove
+from pipeline.change.confidence import NO_MOVE_LOG_ODDS, confidence_features, label_confidence
 from pipeline.change.evidence import ObjectEvidence
 from pipeline.change.labels import labels_from_association
 from pipeline.result import ChangeLabel
 from pipeline.settings import ChangeSettings, Settings
 
+# Objects of the two visits that overlap this much (intersection over union) are at one place: at most one
+# object of either visit can.
+_ONE_PLACE_OVERLAP = 0.5
 # Label code of an object that nobody has seen yet.
 NOT_MET = 255
 
@@ -67,6 +71,8 @@ class Decision:
         identities: objects of both visits.
         labels0, labels1: ``ChangeLabel`` codes per instance, ``NOT_MET`` before it was seen.
         confidence0, confidence1: of the labels, in [0, 1].
+        log_odds: of a change at the place of each object, for either visit.
+        move_log_odds: of the likeliest move of each object, for either visit.
     """
 
     identities: tuple[Identity, ...]
@@ -74,6 +80,8 @@ class Decision:
     labels1: NDArray[np.int64]
     confidence0: NDArray[np.float64]
     confidence1: NDArray[np.float64]
+    log_odds: tuple[NDArray[np.float64], NDArray[np.float64]]
+    move_log_odds: tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 # Chooses moves among those between two sets of instances (counted from 1) that may have moved.
@@ -117,7 +125,10 @@ def decide_by_association(
     ]
     for identity in identities:
         confidence[0][identity.previous] = confidence[1][identity.current] = identity.confidence
-    return _finished(identities, (previous, current), (full0, full1), (confidence[0], confidence[1]))
+    visits = (previous, current)
+    no_moves = (np.full(len(full0), NO_MOVE_LOG_ODDS), np.full(len(full1), NO_MOVE_LOG_ODDS))
+    odds = (previous.log_odds, current.log_odds)
+    return _finished(identities, visits, (full0, full1), (confidence[0], confidence[1]), odds, no_moves)
 
 
 def decide_by_evidence(
@@ -125,6 +136,7 @@ def decide_by_evidence(
     current: VisitEvidence,
     overlap: NDArray[np.float64],
     find_moves: FindMoves,
+    move_log_odds: tuple[NDArray[np.float64], NDArray[np.float64]],
     settings: Settings,
 ) -> Decision:
     """Decide from what changed at each place.
@@ -133,11 +145,13 @@ def decide_by_evidence(
         previous, current: evidence of either visit.
         overlap: (n, m) voxel intersection over union of the objects' places.
         find_moves: finds objects that left their place at another one.
+        move_log_odds: (K + 1,) of the likeliest move of each object of either visit.
         settings: of the run.
     """
     visits = (previous, current)
     change = settings.change
-    changed = [(visit.log_odds > 0) & visit.is_met for visit in visits]
+    log_odds = _agreed(previous, current, overlap)
+    changed = [(odds > 0) & visit.is_met for odds, visit in zip(log_odds, visits, strict=True)]
     for of_visit in changed:
         of_visit[0] = False  # background is no object, however much of it looks changed
     labels = [
@@ -147,35 +161,55 @@ def decide_by_evidence(
     for visit, code in enumerate((ChangeLabel.DISAPPEARED, ChangeLabel.APPEARED)):
         is_covered = visits[visit].objects.coverage >= change.nu_min
         labels[visit][changed[visit] & is_covered] = code
-    confidence = [_confidence(visit, change) for visit in visits]
-
     may_move = [
         set(
             np.flatnonzero(
-                (visit.log_odds > settings.moves.least_change_log_odds)
+                (odds > settings.moves.least_change_log_odds)
                 & (visit.objects.coverage >= change.nu_min)
                 & visit.is_met
             ).tolist()
         )
         - {0}
-        for visit in visits
+        for odds, visit in zip(log_odds, visits, strict=True)
     ]
-    moved = tuple(
-        Identity(m.previous, m.current, _probability(m.log_odds), m.registration.T_world_motion)
-        for m in find_moves(may_move[0], may_move[1])
-    )
-    for identity in moved:
-        labels[0][identity.previous] = labels[1][identity.current] = ChangeLabel.MOVED
-        confidence[0][identity.previous] = confidence[1][identity.current] = identity.confidence
-        changed[0][identity.previous] = changed[1][identity.current] = True
+    moves = find_moves(may_move[0], may_move[1])
+    likeliest = [odds.copy() for odds in move_log_odds]
+    for move in moves:
+        labels[0][move.previous] = labels[1][move.current] = ChangeLabel.MOVED
+        changed[0][move.previous] = changed[1][move.current] = True
+        likeliest[0][move.previous] = likeliest[1][move.current] = move.log_odds
     identities = _same_place(changed, overlap, previous, current, change)
     for identity in identities:
         labels[0][identity.previous] = labels[1][identity.current] = ChangeLabel.STATIC
-    return _finished((*identities, *moved), visits, (labels[0], labels[1]), (confidence[0], confidence[1]))
+    confidence = [
+        _confidence(codes, odds, visit, move_odds, settings)
+        for codes, odds, visit, move_odds in zip(labels, log_odds, visits, likeliest, strict=True)
+    ]
+    moved = tuple(
+        Identity(m.previous, m.current, float(confidence[0][m.previous]), m.registration.T_world_motion)
+        for m in moves
+    )
+    return _finished(
+        (*identities, *moved),
+        visits,
+        (labels[0], labels[1]),
+        (confidence[0], confidence[1]),
+        log_odds,
+        (likeliest[0], likeliest[1]),
+    )
 
 
-def _probability(log_odds: float) -> float:
-    return float(1.0 / (1.0 + np.exp(-np.clip(log_odds, -30, 30))))
+def _agreed(
+    previous: VisitEvidence, current: VisitEvidence, overlap: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Log odds of a change; what two visits say of one and the same place is averaged."""
+    odds0, odds1 = previous.log_odds.copy(), current.log_odds.copy()
+    rows, columns = np.nonzero(overlap >= _ONE_PLACE_OVERLAP)
+    for row, column in zip(rows + 1, columns + 1, strict=True):
+        size0, size1 = previous.objects.voxel_count[row], current.objects.voxel_count[column]
+        both = previous.log_odds[row] * size0 + current.log_odds[column] * size1
+        odds0[row] = odds1[column] = both / max(size0 + size1, 1)
+    return odds0, odds1
 
 
 def _same_place(
@@ -200,14 +234,19 @@ def _same_place(
     )
 
 
-def _confidence(visit: VisitEvidence, settings: ChangeSettings) -> NDArray[np.float64]:
-    """Confidence of changed or not changed, less where little of the object was observed."""
-    decided = 1.0 / (1.0 + np.exp(-np.clip(np.abs(visit.log_odds), 0, 30)))
-    covered = visit.objects.coverage >= settings.nu_min
-    observed = 0.5 + 0.5 * np.minimum(1.0, visit.objects.coverage)
+def _confidence(
+    labels: NDArray[np.integer],
+    log_odds: NDArray[np.float64],
+    visit: VisitEvidence,
+    move_log_odds: NDArray[np.float64],
+    settings: Settings,
+) -> NDArray[np.float64]:
+    objects = visit.objects
+    features = confidence_features(log_odds, objects.coverage, objects.voxel_count, move_log_odds)
     # An unknown object is the surer unknown the less of it was observed.
-    unknown = 1.0 - visit.objects.coverage
-    return np.where(covered, 0.5 + (decided - 0.5) * observed, unknown)
+    unknown = 1.0 - np.minimum(objects.coverage, 1.0)
+    decided = label_confidence(labels, features, settings.confidence)
+    return np.where(labels == ChangeLabel.UNKNOWN, unknown, decided)
 
 
 def _finished(
@@ -215,10 +254,12 @@ def _finished(
     visits: tuple[VisitEvidence, VisitEvidence],
     labels: tuple[NDArray[np.integer], NDArray[np.integer]],
     confidences: tuple[NDArray[np.float64], NDArray[np.float64]],
+    log_odds: tuple[NDArray[np.float64], NDArray[np.float64]],
+    move_log_odds: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> Decision:
     """A decision that leaves out what was not met, and whose background is static for certain."""
     codes = [np.where(v.is_met, c, NOT_MET).astype(np.int64) for v, c in zip(visits, labels, strict=True)]
     values = [confidence.copy() for confidence in confidences]
     for visit in range(2):
         codes[visit][0], values[visit][0] = ChangeLabel.STATIC, 1.0
-    return Decision(identities, codes[0], codes[1], values[0], values[1])
+    return Decision(identities, codes[0], codes[1], values[0], values[1], log_odds, move_log_odds)

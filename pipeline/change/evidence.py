@@ -32,7 +32,6 @@ _TABLE = (
     "pattern_pixels",
     "pattern_correlation",
     "pattern_lost",
-    "log_odds",
 )
 
 
@@ -76,16 +75,20 @@ class ObjectEvidence:
         """What ``table`` gave, with a background entry put before it; centroids are not in it (NaN)."""
         padded = np.zeros(len(rows) + 1, rows.dtype)
         padded[1:] = rows
-        columns: dict[str, Any] = {name: padded[name].astype(float) for name in _TABLE if name != "log_odds"}
+        columns: dict[str, Any] = {name: padded[name].astype(float) for name in _TABLE}
         for name in ("voxel_count", "compared_count"):
             columns[name] = columns[name].astype(np.int64)
         return cls(**columns, centroid_world=np.full((len(padded), 3), np.nan))
 
-    def table(self, log_odds: NDArray[np.float64]) -> NDArray[np.void]:
-        """(K,) one row per instance (background left out): what thresholds and weights apply to."""
-        rows = np.zeros(len(log_odds) - 1, [(name, np.float32) for name in _TABLE])
-        for name in _TABLE:
-            values = log_odds if name == "log_odds" else getattr(self, name)
+    def table(self, **scores: NDArray[np.float64]) -> NDArray[np.void]:
+        """(K,) one row per instance (background left out): what thresholds and weights apply to.
+
+        Args:
+            scores: further columns, (K + 1,) each.
+        """
+        columns = {name: getattr(self, name) for name in _TABLE} | scores
+        rows = np.zeros(len(self.coverage) - 1, [(name, np.float32) for name in columns])
+        for name, values in columns.items():
             rows[name] = values[1:]
         return rows
 
