@@ -197,6 +197,7 @@ class _Moves:
         self.scored = score_moves(
             candidates[0], candidates[1], surface.up_world, clouds[0].cell_m, settings.moves
         )
+        self._coverage = (final[0].objects.coverage, final[1].objects.coverage)
         self._centroids = final[0].objects.centroid_world
         self.likeliest = (
             np.full(len(final[0].log_odds), NO_MOVE_LOG_ODDS),
@@ -209,9 +210,19 @@ class _Moves:
     def __call__(self, previous: set[int], current: set[int]) -> list[ScoredMove]:
         return choose_moves(
             self.scored,
-            lambda move: move.previous in previous and move.current in current and self._has_moved(move),
+            lambda move: (
+                move.previous in previous
+                and move.current in current
+                and self._is_observed(move)
+                and self._has_moved(move)
+            ),
             self._settings.moves,
         )
+
+    def _is_observed(self, move: ScoredMove) -> bool:
+        """One place was seen without the object; where it stands now need not have been looked at before."""
+        coverage = (self._coverage[0][move.previous], self._coverage[1][move.current])
+        return bool(max(coverage) >= self._settings.change.nu_min)
 
     def _has_moved(self, move: ScoredMove) -> bool:
         T = move.registration.T_world_motion

@@ -162,14 +162,7 @@ def decide_by_evidence(
         is_covered = visits[visit].objects.coverage >= change.nu_min
         labels[visit][changed[visit] & is_covered] = code
     may_move = [
-        set(
-            np.flatnonzero(
-                (odds > settings.moves.least_change_log_odds)
-                & (visit.objects.coverage >= change.nu_min)
-                & visit.is_met
-            ).tolist()
-        )
-        - {0}
+        set(np.flatnonzero((odds > settings.moves.least_change_log_odds) & visit.is_met).tolist()) - {0}
         for odds, visit in zip(log_odds, visits, strict=True)
     ]
     moves = find_moves(may_move[0], may_move[1])
