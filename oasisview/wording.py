@@ -174,6 +174,11 @@ def _why_static(item: MapObject, limits: Limits) -> str:
 
 def _why_moved(item: MapObject, limits: Limits) -> str:
     away = "another place" if item.displacement_m is None else f"{length(item.displacement_m)} away"
+    if item.T_world_motion is not None:
+        return (
+            f"Found again {away}: laid over what stands there, its shape, colours and pattern fit "
+            f"({percent(item.confidence)} sure). Patch by patch, {_match_words(item)}."
+        )
     if item.case is not MatchCase.CONFIDENT:
         return (
             f"Probably the same object in a new place, {away}, but look twice: its patches alone do not "
