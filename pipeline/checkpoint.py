@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -92,6 +93,19 @@ def load_geometry(
         store=store,
         stride=stride,
     )
+
+
+def save_registration(writer: ResultWriter, T_previous_current: NDArray[np.float64], quality: dict) -> None:
+    """Keep the correction between the visits and what is said about it."""
+    writer.save_array("registration/T_previous_current", T_previous_current)
+    writer.save_array("registration/quality", np.frombuffer(json.dumps(quality).encode(), np.uint8))
+
+
+def load_registration(writer: ResultWriter) -> tuple[NDArray[np.float64], dict[str, object]]:
+    """What ``save_registration`` kept."""
+    quality = writer.load_array("registration/quality", mmap=False)
+    T_previous_current = writer.load_array("registration/T_previous_current", mmap=False)
+    return T_previous_current, json.loads(quality.tobytes())
 
 
 def save_observation(writer: ResultWriter, observation: MutualObservation) -> None:

@@ -80,6 +80,27 @@ class SurfaceSettings:
 
 
 @dataclass(frozen=True)
+class RegistrationSettings:
+    """Laying the current visit on the previous one before they are compared."""
+
+    enabled: bool = setting(True, "correct small pose errors between the visits; off = poses as recorded")
+    samples: int = setting(3000, "surface points that take part, even over directions", least=100)
+    reach_m: float = setting(0.1, "least distance within which counterparts are looked for first", unit="m")
+    reach_voxels: float = setting(4.0, "the same, in voxels", unit="voxels")
+    reach_deg: float = setting(2.0, "the same, as a turn of the whole visit about its middle", unit="deg")
+    max_reach_m: float = setting(1.0, "counterparts are never looked for farther away", unit="m")
+    last_reach_voxels: float = setting(2.0, "counterparts lie this near at the end", unit="voxels")
+    loose_below: float = setting(
+        0.01, "directions of smaller eigenvalues of the normal matrix are left as they are"
+    )
+    max_cost_ratio: float = setting(
+        0.95, "a correction is made when the robust cost falls at least to this share"
+    )
+    max_translation_m: float = setting(0.3, "a larger correction is no pose error and is not made", unit="m")
+    max_rotation_deg: float = setting(5.0, "a larger correction is no pose error and is not made", unit="deg")
+
+
+@dataclass(frozen=True)
 class PerceptionSettings:
     """Which backends see."""
 
@@ -269,6 +290,7 @@ class Settings:
     image: ImageSettings = field(default_factory=ImageSettings)
     keyframes: KeyframeSettings = field(default_factory=KeyframeSettings)
     surface: SurfaceSettings = field(default_factory=SurfaceSettings)
+    registration: RegistrationSettings = field(default_factory=RegistrationSettings)
     perception: PerceptionSettings = field(default_factory=PerceptionSettings)
     descriptor: DescriptorSettings = field(default_factory=DescriptorSettings)
     discovery: DiscoverySettings = field(default_factory=DiscoverySettings)

@@ -37,6 +37,7 @@ from pipeline.perception.registry import feature_extractor
 from pipeline.progress import ProgressEvent, Report, Warned, silent
 from pipeline.readers import open_session
 from pipeline.readers.fingerprint import fingerprint
+from pipeline.registration.between_visits import moved_geometry, register_visits
 from pipeline.result import CovisiblePair, KeyframeRecord, Result
 from pipeline.session import Session
 from pipeline.settings import Settings
@@ -113,11 +114,12 @@ class _Run:
         self._writer = writer
         self._report = report
         self._timings_s: dict[str, float] = {}
+        self._registration: dict[str, object] = {}
         self._warnings = [line for session in sessions for line in session.warnings]
 
     def result(self) -> Result:
         """All stages, in the order in which data walks."""
-        geometries = self._front_end()
+        geometries = self._register(self._front_end())
         covisibility = self._covisibility(geometries)
         observation = self._observe(geometries)
         mapped = self._mapped(geometries, covisibility, observation)
@@ -179,6 +181,30 @@ class _Run:
             self._writer.write_features(visit, frame_index, features)
 
         return KeyframeSinks(write_image, write_features)
+
+    def _register(
+        self, geometries: tuple[SessionGeometry, SessionGeometry]
+    ) -> tuple[SessionGeometry, SessionGeometry]:
+        """The current visit laid on the previous one, in whose world the result stays."""
+        if not self._settings.registration.enabled:
+            return geometries
+        previous, current = geometries
+        warnings: list[str] = []
+        with self._stage("register", warnings) as is_done:
+            if is_done:
+                T_previous_current, self._registration = checkpoint.load_registration(self._writer)
+            else:
+                found = register_visits(previous.surface, current.surface, self._settings.registration)
+                if found.warning is not None:
+                    warnings.append(found.warning)
+                    self._report(Warned(found.warning))
+                T_previous_current, self._registration = found.T_previous_current, found.quality()
+                checkpoint.save_registration(self._writer, T_previous_current, self._registration)
+                self._report(ProgressEvent("register", 1, 1))
+        self._warnings += warnings
+        if not self._registration["applied"]:
+            return geometries
+        return previous, moved_geometry(current, T_previous_current)
 
     def _covisibility(self, geometries: tuple[SessionGeometry, SessionGeometry]) -> Covisibility:
         grids = tuple(self._features(visit, geometries[visit])(0).shape[:2] for visit in range(2))
@@ -322,6 +348,7 @@ class _Run:
             "weights": {"features": self._extractor.weights_hash},
             "quality": {
                 "voxel_size_m": round(visits[0].geometry.surface.voxel_size_m, 6),
+                "registration": self._registration,
                 **outcome.quality,
             },
             "warnings": self._warnings,
