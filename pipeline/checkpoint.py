@@ -95,17 +95,15 @@ def load_geometry(
     )
 
 
-def save_registration(writer: ResultWriter, T_previous_current: NDArray[np.float64], quality: dict) -> None:
-    """Keep the correction between the visits and what is said about it."""
-    writer.save_array("registration/T_previous_current", T_previous_current)
-    writer.save_array("registration/quality", np.frombuffer(json.dumps(quality).encode(), np.uint8))
+def save_quality(writer: ResultWriter, name: str, quality: dict[str, Any]) -> None:
+    """Keep what a stage says about itself in the manifest."""
+    writer.save_array(f"quality/{name}", np.frombuffer(json.dumps(quality).encode(), np.uint8))
 
 
-def load_registration(writer: ResultWriter) -> tuple[NDArray[np.float64], dict[str, object]]:
-    """What ``save_registration`` kept."""
-    quality = writer.load_array("registration/quality", mmap=False)
-    T_previous_current = writer.load_array("registration/T_previous_current", mmap=False)
-    return T_previous_current, json.loads(quality.tobytes())
+def load_quality(writer: ResultWriter, name: str) -> dict[str, Any]:
+    """What ``save_quality`` kept."""
+    quality: dict[str, Any] = json.loads(writer.load_array(f"quality/{name}", mmap=False).tobytes())
+    return quality
 
 
 def save_observation(writer: ResultWriter, observation: MutualObservation) -> None:

@@ -98,6 +98,19 @@ class RegistrationSettings:
     )
     max_translation_m: float = setting(0.3, "a larger correction is no pose error and is not made", unit="m")
     max_rotation_deg: float = setting(5.0, "a larger correction is no pose error and is not made", unit="deg")
+    keyframes: bool = setting(True, "correct single keyframes too, where most of them need it")
+    keyframe_samples: int = setting(1000, "pixels of a keyframe that take part", least=100)
+    keyframe_loose_below: float = setting(0.03, "as loose_below; a keyframe sees little of a place")
+    keyframe_max_cost_ratio: float = setting(0.9, "as max_cost_ratio, for a keyframe")
+    keyframe_max_translation_m: float = setting(0.1, "as max_translation_m, for a keyframe", unit="m")
+
+    def reaches_m(self, voxel_m: float, radius_m: float) -> tuple[float, float]:
+        """Within what distance counterparts are looked for at first and at the end; of a view or map of a
+        radius (metres)."""
+        last_m = self.last_reach_voxels * voxel_m
+        turned_m = math.radians(self.reach_deg) * radius_m
+        first_m = max(self.reach_m, self.reach_voxels * voxel_m, turned_m)
+        return max(min(first_m, self.max_reach_m), last_m), last_m
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from hashlib import blake2b
 from itertools import count
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ from pipeline.correspondence.compare import (
 )
 from pipeline.errors import OasisError
 from pipeline.mapping.dense_map import dense_map
-from pipeline.mapping.front_end import KeyframeSinks, SessionGeometry, map_session, reopen_stores
+from pipeline.mapping.front_end import KeyframeSinks, SessionGeometry, map_again, map_session, reopen_stores
 from pipeline.mapping.keyframes import select_keyframes
 from pipeline.mapping.objects import SessionObjects
 from pipeline.mapping.scale import voxel_size_m
@@ -37,7 +38,7 @@ from pipeline.perception.registry import feature_extractor
 from pipeline.progress import ProgressEvent, Report, Warned, silent
 from pipeline.readers import open_session
 from pipeline.readers.fingerprint import fingerprint
-from pipeline.registration.between_visits import moved_geometry, register_visits
+from pipeline.registration.between_visits import register
 from pipeline.result import CovisiblePair, KeyframeRecord, Result
 from pipeline.session import Session
 from pipeline.settings import Settings
@@ -46,6 +47,7 @@ from pipeline.store import ResultWriter, finished_result
 # Changes whenever the same inputs and settings would give another result.
 ENGINE_VERSION = 1
 VISITS = ("previous", "current")
+REGISTERED = 2  # the current visit's geometry, fused anew with corrected poses
 
 
 def run(
@@ -114,7 +116,7 @@ class _Run:
         self._writer = writer
         self._report = report
         self._timings_s: dict[str, float] = {}
-        self._registration: dict[str, object] = {}
+        self._registration: dict[str, Any] = {}
         self._warnings = [line for session in sessions for line in session.warnings]
 
     def result(self) -> Result:
@@ -189,22 +191,28 @@ class _Run:
         if not self._settings.registration.enabled:
             return geometries
         previous, current = geometries
-        warnings: list[str] = []
+        folder, warnings = self._writer.work / "register", list[str]()
         with self._stage("register", warnings) as is_done:
             if is_done:
-                T_previous_current, self._registration = checkpoint.load_registration(self._writer)
+                self._registration = checkpoint.load_quality(self._writer, "registration")
+                if self._writer.has_array(f"geometry_{REGISTERED}/poses"):
+                    stores = reopen_stores(folder, current.surface.voxel_size_m, self._settings)
+                    current = checkpoint.load_geometry(self._writer, REGISTERED, *stores, current.stride)
             else:
-                found = register_visits(previous.surface, current.surface, self._settings.registration)
+                found = register(previous, current, self._settings)
+                self._registration = found.quality()
                 if found.warning is not None:
                     warnings.append(found.warning)
                     self._report(Warned(found.warning))
-                T_previous_current, self._registration = found.T_previous_current, found.quality()
-                checkpoint.save_registration(self._writer, T_previous_current, self._registration)
+                if found.is_applied:
+                    # Not merely moved: voxels cut the surfaces of both visits alike only in one frame.
+                    is_lidar = self._sessions[1].depth_source == "lidar"
+                    current = map_again(current, found.poses, self._settings, folder, is_lidar=is_lidar)
+                    checkpoint.save_geometry(self._writer, REGISTERED, current)
+                checkpoint.save_quality(self._writer, "registration", self._registration)
                 self._report(ProgressEvent("register", 1, 1))
         self._warnings += warnings
-        if not self._registration["applied"]:
-            return geometries
-        return previous, moved_geometry(current, T_previous_current)
+        return previous, current
 
     def _covisibility(self, geometries: tuple[SessionGeometry, SessionGeometry]) -> Covisibility:
         grids = tuple(self._features(visit, geometries[visit])(0).shape[:2] for visit in range(2))

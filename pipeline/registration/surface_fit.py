@@ -71,24 +71,22 @@ class SurfaceTarget:
         points: (N, 3) metres.
         normals: (N, 3) unit.
         voxel_m: spacing of the points.
-        loose_below: eigenvalues of the normal matrix from which on a direction is held by the surfaces.
     """
 
-    def __init__(
-        self,
-        points: NDArray[np.float32],
-        normals: NDArray[np.float32],
-        voxel_m: float,
-        loose_below: float,
-    ) -> None:
+    def __init__(self, points: NDArray[np.float32], normals: NDArray[np.float32], voxel_m: float) -> None:
         self._points = points
         self._normals = normals
         self._voxel_m = voxel_m
-        self._loose_below = loose_below
         self._tree = cKDTree(points, balanced_tree=False)
 
     def fit(
-        self, points: NDArray[np.float32], normals: NDArray[np.float32], reach_m: float, least_reach_m: float
+        self,
+        points: NDArray[np.float32],
+        normals: NDArray[np.float32],
+        reach_m: float,
+        least_reach_m: float,
+        *,
+        loose_below: float,
     ) -> SurfaceFit | None:
         """The small motion that lays points on this surface.
 
@@ -96,6 +94,7 @@ class SurfaceTarget:
             points: (n, 3) metres; normals: (n, 3) unit.
             reach_m, least_reach_m: counterparts are looked for within the first distance at the beginning,
                 within the second at the end.
+            loose_below: directions of smaller eigenvalues of the normal matrix are left as they are.
 
         Returns:
             None when too few points find a counterpart, or every direction is loose.
@@ -112,11 +111,11 @@ class SurfaceTarget:
                 if len(matches.points) < _MIN_MATCHES:
                     return None
                 scale_m = self._scale(matches, reach)
-                step, eigenvalues = self._step(matches, centre, lever_m, scale_m)
+                step, eigenvalues = _step(matches, centre, lever_m, scale_m, loose_below)
                 T = _motion(step, centre, lever_m) @ T
                 if np.linalg.norm(step) < _CONVERGED * self._voxel_m:
                     break
-        loose = int((eigenvalues < self._loose_below).sum())
+        loose = int((eigenvalues < loose_below).sum())
         if loose == UNKNOWNS:
             return None
         before = self._match(points, normals, np.eye(4), reach_m)
@@ -159,20 +158,6 @@ class SurfaceTarget:
         spread = _SCALE_PER_MEDIAN * float(np.median(np.abs(matches.distances)))
         return float(np.clip(spread, min(_LEAST_SCALE_VOXELS * self._voxel_m, reach_m), reach_m))
 
-    def _step(
-        self, matches: _Matches, centre: NDArray[np.float64], lever_m: float, scale_m: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """One Gauss-Newton step (rotation times lever, translation; metres) and the eigenvalues (6,)."""
-        levers = (matches.points - centre) / lever_m
-        jacobian = np.concatenate([np.cross(levers, matches.normals), matches.normals], axis=1)
-        weights = (1 / (1 + (matches.distances / scale_m) ** 2)) ** 2
-        weighted = jacobian * (weights / weights.sum())[:, None]
-        eigenvalues, eigenvectors = np.linalg.eigh(weighted.T @ jacobian)
-        held = eigenvalues >= self._loose_below
-        downhill = eigenvectors.T @ (weighted.T @ -matches.distances)
-        along = np.where(held, downhill / np.where(held, eigenvalues, 1.0), 0.0)
-        return eigenvectors @ along, eigenvalues
-
 
 def _reaches(first_m: float, last_m: float) -> list[float]:
     reaches = [first_m]
@@ -192,3 +177,18 @@ def _motion(step: NDArray[np.float64], centre: NDArray[np.float64], lever_m: flo
 def _cost(matches: _Matches, scale_m: float, count: int) -> float:
     squared = matches.distances**2
     return float((np.sum(squared / (squared + scale_m**2)) + count - len(squared)) / count)
+
+
+def _step(
+    matches: _Matches, centre: NDArray[np.float64], lever_m: float, scale_m: float, loose_below: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """One Gauss-Newton step (rotation times lever, translation; metres) and the eigenvalues (6,)."""
+    levers = (matches.points - centre) / lever_m
+    jacobian = np.concatenate([np.cross(levers, matches.normals), matches.normals], axis=1)
+    weights = (1 / (1 + (matches.distances / scale_m) ** 2)) ** 2
+    weighted = jacobian * (weights / weights.sum())[:, None]
+    eigenvalues, eigenvectors = np.linalg.eigh(weighted.T @ jacobian)
+    held = eigenvalues >= loose_below
+    downhill = eigenvectors.T @ (weighted.T @ -matches.distances)
+    along = np.where(held, downhill / np.where(held, eigenvalues, 1.0), 0.0)
+    return eigenvectors @ along, eigenvalues
