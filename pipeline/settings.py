@@ -100,7 +100,11 @@ class RegistrationSettings:
     max_rotation_deg: float = setting(5.0, "a larger correction is no pose error and is not made", unit="deg")
     keyframes: bool = setting(True, "correct single keyframes too, where most of them need it")
     keyframe_samples: int = setting(1000, "pixels of a keyframe that take part", least=100)
-    keyframe_loose_below: float = setting(0.03, "as loose_below; a keyframe sees little of a place")
+    keyframe_translation_m: float = setting(0.02, "expected error of a keyframe's pose", unit="m")
+    keyframe_rotation_deg: float = setting(1.0, "expected error of a keyframe's pose", unit="deg")
+    keyframe_matches: float = setting(
+        20.0, "what all matches of a keyframe are worth in independent ones, against that expectation"
+    )
     keyframe_max_cost_ratio: float = setting(0.9, "as max_cost_ratio, for a keyframe")
     keyframe_max_translation_m: float = setting(0.1, "as max_translation_m, for a keyframe", unit="m")
 

@@ -6,6 +6,7 @@ that pays is tried on a few keyframes first; poses that are good already would o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from pipeline.camera import rotate_points, rotation_angle_rad, transform_points
 from pipeline.mapping.depth_geometry import depth_geometry
 from pipeline.mapping.front_end import SessionGeometry
 from pipeline.registration.sampling import sample_normal_space
-from pipeline.registration.surface_fit import SurfaceFit, SurfaceTarget
+from pipeline.registration.surface_fit import MotionPrior, SurfaceFit, SurfaceTarget
 from pipeline.settings import RegistrationSettings, Settings
 
 _TRIED = 6
@@ -110,7 +111,13 @@ def _fit(
         transform_points(T_world_camera, points),
         rotate_points(T_world_camera[:3, :3], normals),
         *limits.reaches_m(voxel_m, far_m),
-        loose_below=limits.keyframe_loose_below,
+        loose_below=limits.loose_below,
+        prior=MotionPrior(
+            T_world_camera[:3, 3],
+            limits.keyframe_translation_m,
+            math.radians(limits.keyframe_rotation_deg),
+            limits.keyframe_matches,
+        ),
     )
 
 

@@ -27,6 +27,7 @@ _CONVERGED = 0.002  # of a voxel
 _LEAST_SCALE_VOXELS = 0.15
 _SCALE_PER_MEDIAN = 2.0 * 1.4826
 _MIN_MATCHES = 100
+_SPREAD_VOXELS = 0.3  # of well fitted surfaces, to weigh a prior with
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,22 @@ class SurfaceFit:
     conditioning: NDArray[np.float64]
     loose_directions: int
     displacement_m: float
+
+
+@dataclass(frozen=True)
+class MotionPrior:
+    """How large a motion is to be expected, so that what the surfaces hold weakly does not run away.
+
+    Attributes:
+        origin: (3,) where translations are meant: the camera's centre for the pose of a camera.
+        translation_m, rotation_rad: standard deviations.
+        matches: what all matches together are worth in independent measurements.
+    """
+
+    origin: NDArray[np.float64]
+    translation_m: float
+    rotation_rad: float
+    matches: float
 
 
 @dataclass(frozen=True)
@@ -87,6 +104,7 @@ class SurfaceTarget:
         least_reach_m: float,
         *,
         loose_below: float,
+        prior: MotionPrior | None = None,
     ) -> SurfaceFit | None:
         """The small motion that lays points on this surface.
 
@@ -95,15 +113,17 @@ class SurfaceTarget:
             reach_m, least_reach_m: counterparts are looked for within the first distance at the beginning,
                 within the second at the end.
             loose_below: directions of smaller eigenvalues of the normal matrix are left as they are.
+            prior: of the motion; None = any is as likely.
 
         Returns:
             None when too few points find a counterpart, or every direction is loose.
         """
         if len(points) < _MIN_MATCHES or not len(self._points):
             return None
-        T = np.eye(4)
+        T, made = np.eye(4), np.zeros(UNKNOWNS)
         centre = points.mean(axis=0, dtype=np.float64)
         lever_m = float(np.sqrt(np.mean(np.sum((points - centre) ** 2, axis=1)))) or 1.0
+        pull = _pull(prior, centre, lever_m, _SPREAD_VOXELS * self._voxel_m)
         for reach in _reaches(reach_m, least_reach_m):
             is_last = reach == least_reach_m
             for _ in range(_LAST_STEPS if is_last else _STEPS_PER_LEVEL):
@@ -111,8 +131,8 @@ class SurfaceTarget:
                 if len(matches.points) < _MIN_MATCHES:
                     return None
                 scale_m = self._scale(matches, reach)
-                step, eigenvalues = _step(matches, centre, lever_m, scale_m, loose_below)
-                T = _motion(step, centre, lever_m) @ T
+                step, eigenvalues = _step(matches, centre, lever_m, scale_m, loose_below, pull, made)
+                T, made = _motion(step, centre, lever_m) @ T, made + step
                 if np.linalg.norm(step) < _CONVERGED * self._voxel_m:
                     break
         loose = int((eigenvalues < loose_below).sum())
@@ -180,15 +200,40 @@ def _cost(matches: _Matches, scale_m: float, count: int) -> float:
 
 
 def _step(
-    matches: _Matches, centre: NDArray[np.float64], lever_m: float, scale_m: float, loose_below: float
+    matches: _Matches,
+    centre: NDArray[np.float64],
+    lever_m: float,
+    scale_m: float,
+    loose_below: float,
+    pull: NDArray[np.float64],
+    made: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """One Gauss-Newton step (rotation times lever, translation; metres) and the eigenvalues (6,)."""
+    """One Gauss-Newton step (rotation times lever, translation; metres) and the eigenvalues (6,).
+
+    ``pull`` (6, 6) weighs the steps ``made`` so far (6,) against the matches; the motion is small enough for
+    them to add up.
+    """
     levers = (matches.points - centre) / lever_m
     jacobian = np.concatenate([np.cross(levers, matches.normals), matches.normals], axis=1)
     weights = (1 / (1 + (matches.distances / scale_m) ** 2)) ** 2
     weighted = jacobian * (weights / weights.sum())[:, None]
     eigenvalues, eigenvectors = np.linalg.eigh(weighted.T @ jacobian)
     held = eigenvalues >= loose_below
-    downhill = eigenvectors.T @ (weighted.T @ -matches.distances)
-    along = np.where(held, downhill / np.where(held, eigenvalues, 1.0), 0.0)
-    return eigenvectors @ along, eigenvalues
+    along = eigenvectors[:, held]
+    hessian = np.diag(eigenvalues[held]) + along.T @ pull @ along
+    downhill = along.T @ (weighted.T @ -matches.distances - pull @ made)
+    return along @ np.linalg.solve(hessian, downhill), eigenvalues
+
+
+def _pull(
+    prior: MotionPrior | None, centre: NDArray[np.float64], lever_m: float, spread_m: float
+) -> NDArray[np.float64]:
+    """(6, 6) that a prior adds to the normal matrix of mean squared distances of that spread."""
+    if prior is None:
+        return np.zeros((UNKNOWNS, UNKNOWNS))
+    # A step in terms of the motion at the prior's origin: what turns about the centre also shifts the origin.
+    x, y, z = (prior.origin - centre) / lever_m
+    at_origin = np.eye(UNKNOWNS)
+    at_origin[3:, :3] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]
+    deviations_m = np.repeat([prior.rotation_rad * lever_m, prior.translation_m], 3)
+    return at_origin.T @ np.diag(spread_m**2 / (prior.matches * deviations_m**2)) @ at_origin
