@@ -13,7 +13,7 @@ from pipeline.mapping.front_end import SessionGeometry, map_again
 from pipeline.registration.between_visits import register
 from pipeline.settings import Settings
 
-SETTINGS = Settings().override("keyframes.submap_size", 2)
+SETTINGS = Settings().override("keyframes.submap_size", 2).override("registration.keyframes", True)
 
 
 def with_poses(geometry: SessionGeometry, poses: list[NDArray], folder: Path) -> SessionGeometry:
@@ -82,7 +82,7 @@ def test_correction_beyond_the_limits_is_told_and_not_made(
 ) -> None:
     T = motion((0.02, 0.0, 0.0), (0, 0, 1.5))
     wrong = with_poses(hall[1], [T @ k.T_world_camera for k in hall[1].keyframes], tmp_path)
-    strict = SETTINGS.override("registration.max_rotation_deg", 1.0).override("registration.keyframes", "off")
+    strict = SETTINGS.override("registration.max_rotation_deg", 1.0).override("registration.keyframes", False)
 
     found = register(hall[0], wrong, strict)
 
