@@ -279,9 +279,10 @@ class BaselineSettings:
     )
     min_mask_voxels: int = setting(16, "conceptgraphs: smaller masks are skipped", unit="voxels")
     min_detections: int = setting(3, "conceptgraphs: objects of fewer masks are dropped", least=1)
-    min_similarity: float = setting(
-        0.9,
-        "conceptgraphs, wheres-my-glasses: least cosine of the embeddings of one object (ours: not CLIP's)",
+    embedding_spread: float = setting(
+        0.14,
+        "conceptgraphs, wheres-my-glasses: embeddings of an object differ by this share of what patches"
+        " of a place may, as 1 - cosine, at most (ours: CLIP's thresholds do not transfer)",
     )
     gate_m: float = setting(
         0.9, "wheres-my-glasses: an object is looked for this far around its bounds (value of POCD)", unit="m"
@@ -295,7 +296,10 @@ class BaselineSettings:
         0.45, "wheres-my-glasses: objects less stationary are missing (value of POCD)"
     )
     displacement_m: float = setting(
-        0.1, "objects found again farther away have moved (the paper's tau_d)", unit="m", symbol="tau_d"
+        0.2,
+        "objects found again farther away have moved (no value is published; ours, from development scenes)",
+        unit="m",
+        symbol="tau_d",
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.association.aggregation import patch_owners, patch_shares
+from pipeline.correspondence.compare import VisitImages
 from pipeline.methods import MappedVisits
 
 
@@ -49,25 +50,32 @@ class VisitEmbeddings:
         }
 
 
-def averaged_embeddings(
-    embeddings: VisitEmbeddings, masks: list[NDArray[np.int32]], count: int
-) -> NDArray[np.float32]:
+def averaged_embeddings(embeddings: VisitEmbeddings, visit: VisitImages) -> NDArray[np.float32]:
     """(K + 1, d) mean over the keyframes of each instance's embeddings, unit length; zeros without any.
 
     Args:
         embeddings: of the visit.
-        masks: (h, w) instance of every strided pixel, for each keyframe.
-        count: K.
+        visit: with its objects.
     """
     total: NDArray[np.float32] | None = None
-    for k, mask in enumerate(masks):
-        for instance, vector in embeddings.of_masks(k, mask).items():
+    for k in range(len(visit.geometry.keyframes)):
+        for instance, vector in embeddings.of_masks(k, visit.objects.mask(visit.geometry, k)).items():
             if total is None:
-                total = np.zeros((count + 1, len(vector)), np.float32)
+                total = np.zeros((visit.objects.count + 1, len(vector)), np.float32)
             total[instance] += vector
     if total is None:
-        return np.zeros((count + 1, 1), np.float32)
+        return np.zeros((visit.objects.count + 1, 1), np.float32)
     return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-9)
+
+
+def min_similarity(mapped: MappedVisits) -> float:
+    """Least cosine of two embeddings of one object.
+
+    It follows from where the features' own patches start to look changed: how a correlation reads differs
+    between features, and averages over an object scatter much less than patches do.
+    """
+    patches = mapped.extractor.similarity.threshold
+    return 1.0 - mapped.settings.baseline.embedding_spread * (1.0 - patches)
 
 
 def unit(vector: NDArray[np.floating]) -> NDArray[np.float32]:

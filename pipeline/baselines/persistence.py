@@ -38,6 +38,7 @@ class ObjectLibrary:
         embeddings: (K0 + 1, d) unit vectors of the previous objects.
         low_world, high_world: (K0 + 1, 3) their bounds, metres.
         current_count: K1, objects that the current visit will show.
+        min_similarity: least cosine of two embeddings of one object.
         settings: thresholds.
 
     Attributes:
@@ -55,11 +56,13 @@ class ObjectLibrary:
         low_world: NDArray[np.floating],
         high_world: NDArray[np.floating],
         current_count: int,
+        min_similarity: float,
         settings: BaselineSettings,
     ) -> None:
         self._embeddings = np.asarray(embeddings, np.float64)
         self._low, self._high = low_world - settings.gate_m, high_world + settings.gate_m
         self._settings = settings
+        self._min_similarity = min_similarity
         size = len(embeddings)
         self.hits = np.full(size, settings.prior_hits)
         self.misses = np.full(size, settings.prior_misses)
@@ -111,7 +114,7 @@ class ObjectLibrary:
 
     def _pair(self, numbers: list[int], previous: NDArray[np.intp], allowed: NDArray[np.bool_]) -> None:
         cosine = self._cosine(numbers, previous)
-        allowed = allowed & (cosine >= self._settings.min_similarity)
+        allowed = allowed & (cosine >= self._min_similarity)
         rows, columns = linear_sum_assignment(-np.where(allowed, cosine, -1.0))
         for row, column in zip(rows, columns, strict=True):
             if allowed[row, column]:

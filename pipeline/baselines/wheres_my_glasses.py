@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.baselines.confidence import margin_confidence
-from pipeline.baselines.embedding import VisitEmbeddings, averaged_embeddings
+from pipeline.baselines.embedding import VisitEmbeddings, averaged_embeddings, min_similarity
 from pipeline.baselines.findings import NOT_MET, Findings, outcome
 from pipeline.baselines.instances import InstanceGeometry, instance_geometry
 from pipeline.baselines.light import visit_light
@@ -63,18 +63,20 @@ class WheresMyGlassesMethod:
     ) -> Outcome:
         """Walk through the current visit keyframe by keyframe."""
         settings = mapped.settings.baseline
-        light = visit_light(mapped)
+        light, threshold = visit_light(mapped), min_similarity(mapped)
         previous, current = visits
         places = (
             instance_geometry(previous.geometry, previous.objects),
             instance_geometry(current.geometry, current.objects),
         )
-        masks0 = [
-            previous.objects.mask(previous.geometry, k) for k in range(len(previous.geometry.keyframes))
-        ]
-        known = averaged_embeddings(VisitEmbeddings(mapped, 0, light), masks0, previous.objects.count)
+        known = averaged_embeddings(VisitEmbeddings(mapped, 0, light), previous)
         library = ObjectLibrary(
-            known, places[0].low_world, places[0].high_world, current.objects.count, settings
+            known,
+            places[0].low_world,
+            places[0].high_world,
+            current.objects.count,
+            threshold,
+            settings,
         )
         embeddings = VisitEmbeddings(mapped, 1, light)
         is_met = np.zeros(current.objects.count + 1, bool)
@@ -90,12 +92,12 @@ class WheresMyGlassesMethod:
         labels = beliefs.pop()
         # Objects that no keyframe shows well enough for an embedding were still mapped.
         labels[1][labels[1] == NOT_MET] = ChangeLabel.APPEARED
-        softness = mapped.extractor.similarity.softness
+        softness = settings.embedding_spread * mapped.extractor.similarity.softness
         stationarity = library.stationarity
         best = library.best_similarity()
         similarity = np.where(library.identity != NOBODY, library.similarity, best)
         found = [(int(p), n) for n, p in enumerate(library.identity.tolist()) if p != NOBODY]
-        confidence1 = margin_confidence(similarity, settings.min_similarity, softness)
+        confidence1 = margin_confidence(similarity, threshold, softness)
         confidence0 = np.where(labels[0] == ChangeLabel.DISAPPEARED, 1.0 - stationarity, stationarity)
         for before, after in found:
             confidence0[before] = confidence1[after]

@@ -6,13 +6,14 @@ import numpy as np
 
 from pipeline.camera import PinholeCamera
 from pipeline.synthetic import goods, prints, street, textures, vehicles
-from pipeline.synthetic.changes import Reach, Rearrangement, Spot
+from pipeline.synthetic.changes import Rearrangement
 from pipeline.synthetic.footprint import Area
 from pipeline.synthetic.lighting import daylight
 from pipeline.synthetic.mix import draw_mix
 from pipeline.synthetic.paths import walk
 from pipeline.synthetic.props import Arrangement, Prop, Workshop
 from pipeline.synthetic.shapes import Mesh, box, join, pose
+from pipeline.synthetic.spots import Reach, Spot
 from pipeline.synthetic.world import SensorSettings, SyntheticScene
 
 _BAY_DEPTH_M = 5.0

@@ -11,14 +11,15 @@ Nothing here is beyond knowing: of things that look the same, at most one change
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from pipeline.synthetic.footprint import Area, Footprint, footprint, is_free
+from pipeline.synthetic.footprint import Footprint, footprint, is_free
 from pipeline.synthetic.mix import Mix
 from pipeline.synthetic.props import Arrangement, Prop, Workshop, reprinted
 from pipeline.synthetic.shapes import pose
+from pipeline.synthetic.spots import Reach, Spot
 from pipeline.synthetic.world import Pose
 
 _MODES = {"carried": 0.5, "swapped": 0.16, "shifted": 0.2, "turned": 0.14}
@@ -26,35 +27,6 @@ _SUCCESSORS = {"reprinted": 0.35, "look-alike": 0.35, "different": 0.3}
 _SLACK_M = 0.012  # boxes around things are larger than the things
 _LEAST_TURN_RAD = np.deg2rad(28.0)
 _TRIES = 24
-
-
-@dataclass(frozen=True)
-class Spot:
-    """A place with the thing that stands there before anything happens.
-
-    Attributes:
-        pose: T_world_object.
-        prop: the thing.
-        area: where the thing may be put nearby; None = it can only be turned or taken away.
-        group: things are carried to places of the same group only.
-        weight: how likely it is to be moved, relative to others.
-    """
-
-    pose: Pose
-    prop: Prop
-    area: Area | None = None
-    group: str = ""
-    weight: float = 1.0
-
-
-@dataclass(frozen=True)
-class Reach:
-    """How far things go: short moves (metres, least and most), and what replaces a thing off its place."""
-
-    shift_m: tuple[float, float] = (0.08, 0.45)
-    nudge_m: float = 0.007
-    nudge_rad: float = 0.03
-    footprint_scale: float = 1.0
 
 
 class Rearrangement:

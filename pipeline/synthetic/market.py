@@ -7,13 +7,14 @@ import numpy as np
 from pipeline.camera import PinholeCamera
 from pipeline.synthetic import furniture, goods, prints, street, textures
 from pipeline.synthetic.carpark import OUTDOOR_SENSOR
-from pipeline.synthetic.changes import Reach, Rearrangement, Spot
+from pipeline.synthetic.changes import Rearrangement
 from pipeline.synthetic.footprint import Area, Footprint, footprint
 from pipeline.synthetic.lighting import daylight
 from pipeline.synthetic.mix import draw_mix
 from pipeline.synthetic.paths import walk
 from pipeline.synthetic.props import Arrangement, Prop, Workshop, scatter
 from pipeline.synthetic.shapes import Mesh, box, join, pose
+from pipeline.synthetic.spots import Reach, Spot
 from pipeline.synthetic.world import SyntheticScene
 
 

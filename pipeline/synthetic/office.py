@@ -6,13 +6,14 @@ import numpy as np
 
 from pipeline.camera import PinholeCamera
 from pipeline.synthetic import furniture, prints, textures
-from pipeline.synthetic.changes import Rearrangement, Spot
+from pipeline.synthetic.changes import Rearrangement
 from pipeline.synthetic.footprint import Area, footprint, is_free
 from pipeline.synthetic.lighting import room_lighting
 from pipeline.synthetic.mix import draw_mix
 from pipeline.synthetic.paths import walk
 from pipeline.synthetic.props import Arrangement, Prop, Workshop, scatter
 from pipeline.synthetic.shapes import Mesh, box, join, pose
+from pipeline.synthetic.spots import Spot
 from pipeline.synthetic.world import SensorSettings, SyntheticScene
 
 _CARTON_BOARD = (186, 146, 102)

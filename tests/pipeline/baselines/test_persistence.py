@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
 from pipeline.baselines.persistence import Candidate, ObjectLibrary
 from pipeline.settings import BaselineSettings
 
-SETTINGS = dataclasses.replace(BaselineSettings(), min_similarity=0.9)
+SETTINGS = BaselineSettings()
+MIN_SIMILARITY = 0.9
 EAST, NORTH = np.array([1.0, 0.0]), np.array([0.0, 1.0])
 # Two objects, 10 m apart: the first looks east, the second north.
 PLACES = np.array([[0.0, 0, 0], [0.0, 0, 0], [10.0, 0, 0]])
@@ -19,7 +18,7 @@ NOT_EXPECTED, BOTH_EXPECTED = np.zeros(3), np.array([1.0, 1.0, 1.0])
 
 def library(embeddings: tuple[np.ndarray, np.ndarray] = (EAST, NORTH), current: int = 2) -> ObjectLibrary:
     vectors = np.stack([np.zeros(2), *embeddings])
-    return ObjectLibrary(vectors, PLACES - 0.5, PLACES + 0.5, current, SETTINGS)
+    return ObjectLibrary(vectors, PLACES - 0.5, PLACES + 0.5, current, MIN_SIMILARITY, SETTINGS)
 
 
 def at(x: float, embedding: np.ndarray) -> Candidate:
@@ -126,7 +125,7 @@ def test_partner_of_an_object_gone_missing_is_released() -> None:
 
 
 def test_best_similarity_of_a_visit_without_objects_is_zero() -> None:
-    empty = ObjectLibrary(np.zeros((1, 2)), np.zeros((1, 3)), np.zeros((1, 3)), 1, SETTINGS)
+    empty = ObjectLibrary(np.zeros((1, 2)), np.zeros((1, 3)), np.zeros((1, 3)), 1, MIN_SIMILARITY, SETTINGS)
     empty.observe({1: at(0.0, EAST)}, np.zeros(1))
     assert empty.best_similarity().tolist() == [0.0, 0.0]
     assert empty.identity.tolist() == [0, 0]
