@@ -38,7 +38,7 @@ from pipeline.perception.registry import feature_extractor
 from pipeline.progress import ProgressEvent, Report, Warned, silent
 from pipeline.readers import open_session
 from pipeline.readers.fingerprint import fingerprint
-from pipeline.registration.between_visits import register
+from pipeline.registration.between_visits import moved_geometry, register
 from pipeline.result import CovisiblePair, KeyframeRecord, Result
 from pipeline.session import Session
 from pipeline.settings import Settings
@@ -204,14 +204,16 @@ class _Run:
                 if found.warning is not None:
                     warnings.append(found.warning)
                     self._report(Warned(found.warning))
-                if found.is_applied:
-                    # Not merely moved: voxels cut the surfaces of both visits alike only in one frame.
+                if found.keyframes is not None and found.keyframes.corrected:
                     is_lidar = self._sessions[1].depth_source == "lidar"
                     current = map_again(current, found.poses, self._settings, folder, is_lidar=is_lidar)
                     checkpoint.save_geometry(self._writer, REGISTERED, current)
                 checkpoint.save_quality(self._writer, "registration", self._registration)
                 self._report(ProgressEvent("register", 1, 1))
         self._warnings += warnings
+        if self._registration["applied"] and not self._registration.get("keyframes_corrected"):
+            # JSON keeps every bit of a float: a resumed run moves the visit exactly as the first one did.
+            current = moved_geometry(current, np.array(self._registration["T_previous_current"]))
         return previous, current
 
     def _covisibility(self, geometries: tuple[SessionGeometry, SessionGeometry]) -> Covisibility:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.camera import rotation_angle_rad, transform_points
+from pipeline.camera import rotate_points, rotation_angle_rad, transform_points
 from pipeline.mapping.front_end import SessionGeometry
 from pipeline.mapping.surface import FusedSurface
 from pipeline.registration.keyframes import KeyframeCorrections, register_keyframes
@@ -138,6 +138,25 @@ def register_visit(target: SurfaceTarget, current: FusedSurface, settings: Regis
     elif translation_m > settings.max_translation_m or rotation_deg > settings.max_rotation_deg:
         reason = "too large"
     return VisitFit(np.eye(4) if reason else T, fit, translation_m, rotation_deg, reason)
+
+
+def moved_geometry(geometry: SessionGeometry, T_new_world: NDArray[np.float64]) -> SessionGeometry:
+    """A mapped visit in another world frame: poses, surface and submaps; numbers of voxels stay."""
+    surface, rotation = geometry.surface, T_new_world[:3, :3]
+    keyframes = tuple(
+        replace(keyframe, T_world_camera=T_new_world @ keyframe.T_world_camera)
+        for keyframe in geometry.keyframes
+    )
+    moved = replace(
+        surface,
+        points_world=transform_points(T_new_world, surface.points_world.astype(np.float64)).astype(
+            np.float32
+        ),
+        normals_world=rotate_points(rotation, surface.normals_world),
+        up_world=rotation @ surface.up_world,
+        camera_positions_world=np.array([k.T_world_camera[:3, 3] for k in keyframes]),
+    )
+    return replace(geometry, keyframes=keyframes, surface=moved, submaps=geometry.submaps.moved(T_new_world))
 
 
 def _left(reason: str) -> VisitFit:
