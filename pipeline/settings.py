@@ -245,7 +245,7 @@ class MoveSettings:
     min_rotation_deg: float = setting(
         10.0, "an object turned on the spot by more than this moved", unit="deg"
     )
-    min_log_odds: float = setting(0.3, "log odds from which two objects are one that moved")
+    min_log_odds: float = setting(-1.3, "log odds from which two objects are one that moved")
     # Weights of association.moves, from benchmarks/fit_move_score.py on scenes that no table reports.
     bias: float = setting(-4.43, "log odds that two objects are one before any evidence")
     overlap_more_weight: float = setting(
