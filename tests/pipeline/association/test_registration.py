@@ -178,14 +178,13 @@ def test_sides_that_were_not_seen_do_not_count_against_it() -> None:
     now_from = np.array([[-3.0, 0, 1.5], [0, 3.0, 1.5]])
     shift = np.array([2.0, 1.0, 0.0])
     before, now = seen_from(box(), before_from), moved(seen_from(box(), now_from), 0.0, shift, now_from)
-    missing = len(before) / len(box())
-    assert missing < 0.7
+    assert len(before) < 0.7 * len(box())
 
     found = register(before, now, UP, SPACING_M)
 
     angle_deg, distance_m = error(found, 0.0, shift)
-    assert angle_deg < 3
-    assert distance_m < 2 * SPACING_M
+    assert angle_deg < 5  # sides without a counterpart pull a little
+    assert distance_m < SPACING_M
     assert found.overlap > 0.9
     assert found.shared < 0.85  # as a share of all points it would look like two things
 
