@@ -98,9 +98,9 @@ def test_what_moved_scores_above_a_look_alike_and_seeing_both_places_empty_speak
     left = [candidate(1, cloud(RED)), candidate(2, cloud(RED, print_seed=5))]
 
     same, other = score_moves(left, taken, UP, SPACING_M, SETTINGS)
-    kept = score_moves(
-        [candidate(1, cloud(RED), seen_through=0.0), left[1]], taken, UP, SPACING_M, SETTINGS
-    )[0]
+    kept = score_moves([candidate(1, cloud(RED), seen_through=0.0), left[1]], taken, UP, SPACING_M, SETTINGS)[
+        0
+    ]
 
     assert (same.previous, other.previous) == (1, 2)
     assert same.log_odds > other.log_odds

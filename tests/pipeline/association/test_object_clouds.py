@@ -54,7 +54,9 @@ def test_cloud_lies_on_its_object_and_is_finer_than_the_voxels(
     assert len(np.unique(cells, axis=0)) > 0.95 * len(cells)  # a mean may stray over its cell's rounding
 
 
-def test_viewpoints_are_those_that_see_the_object(clouds: ObjectClouds, objects: SessionObjects, hall) -> None:
+def test_viewpoints_are_those_that_see_the_object(
+    clouds: ObjectClouds, objects: SessionObjects, hall
+) -> None:
     cloud = clouds.of(1)
     seeing = int((objects.view_pixels[:, 1] > 0).sum())
 
