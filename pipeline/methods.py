@@ -55,7 +55,8 @@ class Outcome:
         evidence: of the previous and the current visit, structured rows in instance order; the columns are
             the method's own.
         quality: figures about the whole pair, for the manifest.
-        moves: pairs of objects that were laid over each other, structured rows; None where a method lays none.
+        moves: pairs of objects that were laid over each other, structured rows; None where the method lays
+            none.
     """
 
     assembled: Assembled

@@ -136,7 +136,7 @@ def test_each_object_is_laid_over_its_likest_partners_only(laid_over: list[int])
 
 def test_no_more_registrations_than_allowed_and_the_likest_first(laid_over: list[int]) -> None:
     left = [candidate(1, cloud(RED))]
-    taken = [candidate(i, cloud(RED + [0.02 * i, 0, 0])) for i in range(5)]
+    taken = [candidate(i, cloud(RED + 0.02 * i * np.array([1, 0, 0]))) for i in range(5)]
 
     scored = score_moves(left, taken, UP, SPACING_M, replace(SETTINGS, max_registrations=2))
 
