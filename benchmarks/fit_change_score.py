@@ -24,7 +24,7 @@ from pipeline.result import ChangeLabel
 from pipeline.settings import ChangeSettings
 from pipeline.store import open_result
 
-NAMES = ("bias", "seen_through", "dissimilarity", "residual", "texture", "tail")
+NAMES = ("bias", "seen_through", "dissimilarity", "residual", "texture", "tail", "pattern")
 MATCH_RADIUS_M = 0.15
 MIN_COVERAGE = 0.3
 RIDGE = 0.02
@@ -34,7 +34,7 @@ MAX_WEIGHT_POINTS = 2000
 
 @dataclass(frozen=True)
 class Examples:
-    """Objects of one result: features (N, 6), truth (N,) and weight (N,) by size."""
+    """Objects of one result: features (N, 7), truth (N,) and weight (N,) by size."""
 
     features: NDArray[np.float64]
     is_changed: NDArray[np.bool_]
@@ -64,7 +64,8 @@ def read_examples(folder: Path) -> Examples:
     features, changed, weight = [], [], []
     for number, session in enumerate(result.sessions):
         evidence = ObjectEvidence.from_table(session.evidence)  # type: ignore[attr-defined]
-        values = change_features(evidence) * np.array([1.0, *[trust] * 4])
+        # Colours and patches count as far as the visits' colours agree, geometry and patterns always.
+        values = change_features(evidence) * np.array([1.0, *[trust] * 4, 1.0])
         mine = truth.session == number
         distance, nearest = cKDTree(truth.points_world[mine]).query(
             np.asarray(session.points_world), distance_upper_bound=MATCH_RADIUS_M

@@ -55,11 +55,14 @@ class Outcome:
         evidence: of the previous and the current visit, structured rows in instance order; the columns are
             the method's own.
         quality: figures about the whole pair, for the manifest.
+        moves: pairs of objects that were laid over each other, structured rows; None where the method lays
+            none.
     """
 
     assembled: Assembled
     evidence: tuple[NDArray[np.void], NDArray[np.void]]
     quality: dict[str, float]
+    moves: NDArray[np.void] | None = None
 
 
 class Method(Protocol):

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 from pipeline.assemble import assemble
+from pipeline.association.moves import moves_table
 from pipeline.change.change_score import appearance_trust
 from pipeline.change.decide import decide
 from pipeline.correspondence.compare import Comparison, VisitImages
@@ -67,4 +68,6 @@ class OasisMethod:
             "appearance_scale_log": round(conclusion.appearance_scale, 4),
             "appearance_trust": round(appearance_trust(conclusion.appearance_scale, settings.change), 4),
         }
-        return Outcome(assemble(*visits, conclusion, settings), (tables[0], tables[1]), quality)
+        assembled = assemble(*visits, conclusion, settings)
+        moves = moves_table(conclusion.moves, assembled.ids0, assembled.ids1)
+        return Outcome(assembled, (tables[0], tables[1]), quality, moves)

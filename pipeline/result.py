@@ -79,7 +79,8 @@ class MapObject:
         sigma: match proportion to that counterpart, in [0, 1]; 0 without any link.
         s_bar: mean confidence of those matches; 0 without any link.
         coverage: the smaller nu of its sightings (the evidence that decides unknown).
-        displacement_m: centroid distance between the visits, for objects seen in both; else None.
+        displacement_m: how far its centroid went between the visits, by ``T_world_motion`` where that is
+            known, for objects seen in both; else None.
         rotation_rad: rotation between the visits where it was estimated; else None.
         seen_through: share of its observed volume that the other visit saw to be empty, in [0, 1].
         appearance_change: how differently the same place looks in the other visit, in [0, 1];

@@ -337,6 +337,8 @@ class _Run:
         self._writer.write_objects(
             assembled.objects, assembled.replaced, assembled.score_matrix, assembled.belief
         )
+        if outcome.moves is not None:
+            self._writer.write_moves(outcome.moves)
         self._timings_s["write"] = round(time.perf_counter() - started, 3)
         return self._writer.finish(self._manifest(visits, outcome))
 

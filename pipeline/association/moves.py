@@ -141,6 +141,25 @@ def choose_moves(
     return [possible[number] for number in chosen if number >= 0]
 
 
+def moves_table(
+    scored: Sequence[ScoredMove], ids0: NDArray[np.integer], ids1: NDArray[np.integer]
+) -> NDArray[np.void]:
+    """(n,) one row per pair: object ids of both, every feature, and the log odds that they are one.
+
+    Args:
+        scored: chosen or not.
+        ids0, ids1: (K + 1,) object id of every instance of the previous and the current visit.
+    """
+    numbers = [(name, np.int32) for name in ("previous_object_id", "current_object_id")]
+    rows = np.zeros(len(scored), [*numbers, *((name, np.float32) for name in (*FEATURES, "log_odds"))])
+    for row, move in zip(rows, scored, strict=True):
+        row["previous_object_id"], row["current_object_id"] = ids0[move.previous], ids1[move.current]
+        row["log_odds"] = move.log_odds
+        for name, value in zip(FEATURES, move.features, strict=True):
+            row[name] = value
+    return rows
+
+
 def _alike(
     previous: Sequence[Candidate],
     current: Sequence[Candidate],

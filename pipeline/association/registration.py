@@ -290,20 +290,6 @@ def _reach_m(cloud: ObjectCloud) -> float:
     return float(np.linalg.norm(high - low))
 
 
-def register_in_place(previous: ObjectCloud, current: ObjectCloud, spacing_m: float) -> Registration:
-    """Like :func:`register` for what should stand where it stood: only the poses' error is taken out."""
-    fine0, fine1 = previous.sampled(_FINE_SAMPLE), current.sampled(3 * _FINE_SAMPLE)
-    gain = float(np.median(current.log_colours.mean(axis=1)) - np.median(previous.log_colours.mean(axis=1)))
-    rotations, translations = np.eye(3)[None], np.zeros((1, 3))
-    for step in range(_FINE_ROUNDS):
-        share = step / (_FINE_ROUNDS - 1)
-        target = _Target(fine1, gain, spacing_m * 5 ** (1 - share) * 2**share)
-        rotations, translations, _ = target.improve(fine0, rotations, translations, None)
-    return _compared(
-        previous, current, cKDTree(current.points_world), rotations[0], translations[0], spacing_m
-    )
-
-
 def _compared(
     previous: ObjectCloud,
     current: ObjectCloud,

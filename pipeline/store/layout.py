@@ -53,6 +53,11 @@ class ResultLayout:
         """Raw evidence of a visit's instances, one structured row each."""
         return self.session(session) / "evidence.npy"
 
+    @property
+    def moves(self) -> Path:
+        """Pairs of objects that were laid over each other; not every method writes it."""
+        return self.root / "moves.npy"
+
     def image(self, session: int, frame_index: int) -> Path:
         """JPEG of a keyframe."""
         return self.session(session) / "images" / f"{frame_index:05d}.jpg"

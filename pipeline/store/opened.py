@@ -162,6 +162,14 @@ class StoredResult:
         """(submaps of the current visit, objects) label believed after each submap; 255 = not met yet."""
         return read_array(self.layout.belief)
 
+    @property
+    def moves(self) -> NDArray[np.void] | None:
+        """Pairs of objects laid over each other, fields as in ``association.moves.moves_table``.
+
+        None in results of methods that lay nothing, and of before there were such pairs.
+        """
+        return read_array(self.layout.moves) if self.layout.moves.exists() else None
+
     @cached_property
     def _by_id(self) -> dict[int, MapObject]:
         return {item.object_id: item for item in self.objects}

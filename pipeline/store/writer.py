@@ -225,6 +225,10 @@ class ResultWriter:
         """(K,) structured rows of raw evidence, in instance order."""
         write_array(self.layout.evidence(session), evidence)
 
+    def write_moves(self, moves: NDArray[np.void]) -> None:
+        """Structured rows, one per pair of objects that was laid over each other."""
+        write_array(self.layout.moves, moves)
+
     def write_objects(
         self,
         objects: Sequence[MapObject],

@@ -73,6 +73,23 @@ def test_keyframes_hold_what_was_rendered(small_result: Result) -> None:
     assert np.nanmean(geometric[mask == 9]) < -0.3  # it disappeared: the current visit sees past it
 
 
+def test_moves_are_read_where_a_method_wrote_them(tmp_path: Path) -> None:
+    path = write_small_result(tmp_path)
+    assert open_result(path).moves is None  # as in results of before there were any
+
+    names = ("previous_object_id", "current_object_id", "log_odds")
+    rows = np.array([(4, 4, 1.5), (5, 12, -2.0)], list(zip(names, ("<i4", "<i4", "<f4"), strict=True)))
+    for written in (rows, rows[:0]):  # none were alike enough is not the same as never looked
+        write_array(path / "moves.npy", written)
+        moves = open_result(path).moves
+        assert moves.dtype == rows.dtype
+        assert moves.tolist() == written.tolist()
+
+    (path / "moves.npy").write_bytes(b"not an array")
+    with pytest.raises(ResultError, match=r"moves\.npy"):
+        _ = open_result(path).moves
+
+
 def test_masks_agree_with_the_map(small_result: Result) -> None:
     for session in small_result.sessions:
         in_masks = {

@@ -14,6 +14,8 @@ from fixture_scene import CAMERA, OBJECTS, camera_pose, render
 
 import pipeline.oasis as method_module
 import pipeline.system as run_module
+from pipeline.association.moves import FEATURES
+from pipeline.camera import is_rigid
 from pipeline.change.decision import NOT_MET
 from pipeline.errors import SceneMismatchError
 from pipeline.progress import ProgressEvent, Warned
@@ -181,6 +183,34 @@ def test_one_identity_per_object_in_maps_masks_and_score_matrix(finished: Result
         assert changed[event.disappeared_id].replaced_by == event.appeared_id
 
 
+def test_what_was_laid_over_what_is_told_and_adds_up(finished: Result) -> None:
+    moves = finished.moves
+    weights = [getattr(SETTINGS.moves, f"{name}_weight") for name in FEATURES]
+    log_odds = SETTINGS.moves.bias + sum(w * moves[n] for w, n in zip(weights, FEATURES, strict=True))
+    assert log_odds == pytest.approx(moves["log_odds"], abs=1e-3)
+    for row in moves:
+        assert finished.object(int(row["previous_object_id"])).sighting(0) is not None
+        assert finished.object(int(row["current_object_id"])).sighting(1) is not None
+    moved = [o for o in finished.objects if o.label is ChangeLabel.MOVED]
+    assert moved  # objects 4 and 5 of the hall did
+    likely = moves[moves["log_odds"] > SETTINGS.moves.min_log_odds]
+    for found in moved:
+        pair = likely[
+            (likely["previous_object_id"] == found.object_id)
+            & (likely["current_object_id"] == found.object_id)
+        ]
+        assert len(pair) == 1
+        assert found.confidence == pytest.approx(1 / (1 + np.exp(-pair["log_odds"][0])), abs=1e-4)
+        T = np.array(found.T_world_motion)
+        assert is_rigid(T, tolerance=1e-4)
+        before = np.array(found.sightings[0].centroid_world_m)
+        shift_m = np.linalg.norm(T[:3, :3] @ before + T[:3, 3] - before)
+        assert found.displacement_m == pytest.approx(shift_m, abs=1e-4)
+        assert np.cos(found.rotation_rad) == pytest.approx((np.trace(T[:3, :3]) - 1) / 2, abs=1e-4)
+        is_turned = found.rotation_rad > np.radians(SETTINGS.moves.min_rotation_deg)
+        assert shift_m > SETTINGS.change.tau_d_m or is_turned
+
+
 def test_changes_of_the_hall_are_found(finished: Result) -> None:
     def machine_labels(visit: int, object_id: int) -> set[ChangeLabel]:
         low, high = (np.array(corner) for corner in OBJECTS[object_id - 1].boxes[visit])
@@ -214,6 +244,8 @@ def test_paper_rule_runs_and_differs_only_in_its_rule(archives: tuple[Path, Path
     )
 
     assert result.manifest["settings"]["change"]["rule"] == "paper"
+    assert len(result.moves) == 0
+    assert {o.T_world_motion for o in result.objects} == {None}
     for found in result.objects:
         if len(found.sightings) == 2:
             moved = found.displacement_m > SETTINGS.change.tau_d_m

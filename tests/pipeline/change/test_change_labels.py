@@ -6,10 +6,11 @@ import dataclasses
 
 import numpy as np
 import pytest
-from pipeline.association.reassociation import FoundAgain
 
 from pipeline.association.accumulation import AccumulatedAssociation
 from pipeline.association.aggregation import MatchEvidence
+from pipeline.association.moves import FEATURES, ScoredMove
+from pipeline.association.registration import Registration
 from pipeline.change.decision import (
     NOT_MET,
     Decision,
@@ -21,10 +22,11 @@ from pipeline.change.evidence import ObjectEvidence
 from pipeline.change.labels import labels_from_association
 from pipeline.change.replaced import bounds_overlap, find_replaced
 from pipeline.result import ChangeLabel as L
-from pipeline.settings import AssociationSettings, ChangeSettings
+from pipeline.settings import AssociationSettings, ChangeSettings, Settings
 
 GATES = AssociationSettings(tau_sigma=0.3, tau_s=0.85)
-CHANGE = ChangeSettings(tau_d_m=0.1, nu_min=0.5, vacated_share=0.4, same_place_overlap=0.1)
+CHANGE = ChangeSettings(tau_d_m=0.1, nu_min=0.5, same_place_overlap=0.1)
+SETTINGS = Settings(change=CHANGE)
 
 
 def eq8(pairs, x0, x1, nu0, nu1) -> tuple[list[int], list[int]]:
@@ -62,8 +64,12 @@ def visit(
     changed: list[bool] | bool = False,
     is_met: list[bool] | bool = True,
     background: tuple[float, bool] = (-5.0, True),
+    log_odds: list[float] | None = None,
 ) -> VisitEvidence:
-    """Objects at the given places along x; ``background`` = its log odds and whether it was met."""
+    """Objects at the given places along x; ``background`` = its log odds and whether it was met.
+
+    ``log_odds`` of a change, where 5 for the changed and -5 for the others will not do.
+    """
     n = len(x)
 
     def column(values: object, first: float) -> np.ndarray:
@@ -78,9 +84,9 @@ def visit(
         "centroid_world": np.array([[-9.0, 0, 0], *([place, 0, 0] for place in x)]),
     }
     fields = {f.name: given.get(f.name, np.zeros(n + 1)) for f in dataclasses.fields(ObjectEvidence)}
-    log_odds = np.where(column(changed, 0) > 0, 5.0, -5.0)
-    log_odds[0] = background[0]
-    return VisitEvidence(ObjectEvidence(**fields), log_odds, column(is_met, background[1]) > 0)
+    odds = np.where(column(changed, 0) > 0, 5.0, -5.0) if log_odds is None else column(log_odds, 0)
+    odds[0] = background[0]
+    return VisitEvidence(ObjectEvidence(**fields), odds, column(is_met, background[1]) > 0)
 
 
 def association(n: int, m: int, links: dict[tuple[int, int], tuple[int, float]], leaving: int = 10):
@@ -125,16 +131,22 @@ def test_paper_rule_ties_identities_by_association() -> None:
     assert decision.confidence1[1] == pytest.approx(0.9)
 
 
-def by_evidence(before, now, overlap=None, links=None, found=()) -> Decision:
-    n, m = before.count, now.count
-    overlap = np.zeros((n, m)) if overlap is None else np.array(overlap, float)
+def move(previous: int, current: int, log_odds: float = 2.0, x_m: float = 2.0) -> ScoredMove:
+    """A move along x."""
+    T = np.eye(4)
+    T[0, 3] = x_m
+    registration = Registration(T, 0.9, 0.9, 0.9, 0.5, 0.1, 0.1, 0.9, 0.2, 0.0)
+    return ScoredMove(previous, current, registration, np.zeros(len(FEATURES)), log_odds)
+
+
+def by_evidence(before, now, overlap=None, moves=()) -> Decision:
+    overlap = np.zeros((before.count, now.count)) if overlap is None else np.array(overlap, float)
     return decide_by_evidence(
         before,
         now,
         overlap,
-        association(n, m, links or {}),
-        lambda left, taken: [f for f in found if f.previous in left and f.current in taken],
-        CHANGE,
+        lambda left, taken: [m for m in moves if m.previous in left and m.current in taken],
+        SETTINGS,
     )
 
 
@@ -150,7 +162,7 @@ def test_evidence_rule_by_hand() -> None:
     overlap = np.zeros((4, 3))
     overlap[0, 0] = 0.7
 
-    decision = by_evidence(before, now, overlap, found=[FoundAgain(4, 3, 0.8, 0.9)])
+    decision = by_evidence(before, now, overlap, moves=[move(4, 3)])
 
     assert decision.labels0.tolist() == [L.STATIC, L.STATIC, L.DISAPPEARED, L.UNKNOWN, L.MOVED]
     assert decision.labels1.tolist() == [L.STATIC, L.STATIC, L.APPEARED, L.MOVED]
@@ -159,23 +171,55 @@ def test_evidence_rule_by_hand() -> None:
         assert ((confidence >= 0) & (confidence <= 1)).all()
 
 
-def test_object_first_thought_gone_is_found_again_by_the_association() -> None:
+def test_move_gives_identity_motion_and_the_probability_of_its_log_odds() -> None:
     before = visit([0.0], seen_through=0.9, changed=True)
     now = visit([2.0], seen_through=0.9, changed=True)
 
-    decision = by_evidence(before, now, links={(0, 0): (8, 0.95)})
+    decision = by_evidence(before, now, moves=[move(1, 1, log_odds=1.5)])
 
-    assert (decision.labels0[1], decision.labels1[1]) == (L.MOVED, L.MOVED)
+    (identity,) = decision.identities
+    assert (identity.previous, identity.current) == (1, 1)
+    assert identity.T_world_motion[:3, 3].tolist() == [2.0, 0, 0]
+    assert decision.confidence0[1] == decision.confidence1[1] == pytest.approx(1 / (1 + np.exp(-1.5)))
 
 
-def test_object_whose_place_was_not_seen_empty_did_not_move() -> None:
-    before = visit([0.0], seen_through=0.9, changed=True)
-    now = visit([2.0], seen_through=0.1, changed=True)  # something stood here before
+def moved_if_possible(before: VisitEvidence, now: VisitEvidence) -> bool:
+    decision = by_evidence(before, now, moves=[move(1, 1)])
+    moved = [labels[1] == L.MOVED for labels in (decision.labels0, decision.labels1)]
+    assert moved[0] == moved[1] == (len(decision.identities) == 1)
+    return moved[0]
 
-    decision = by_evidence(before, now, links={(0, 0): (8, 0.95)}, found=[FoundAgain(1, 1, 0.9, 0.9)])
 
-    assert (decision.labels0[1], decision.labels1[1]) == (L.DISAPPEARED, L.APPEARED)
-    assert decision.identities == ()
+def test_doubtful_change_may_move_and_a_sure_stay_may_not() -> None:
+    least = SETTINGS.moves.least_change_log_odds
+    gone = visit([0.0], changed=True)
+
+    assert moved_if_possible(gone, visit([2.0], log_odds=[least + 0.01]))
+    assert moved_if_possible(visit([0.0], log_odds=[least + 0.01]), visit([2.0], changed=True))
+    assert not moved_if_possible(gone, visit([2.0], log_odds=[least]))
+    assert not moved_if_possible(visit([0.0], log_odds=[least]), visit([2.0], changed=True))
+
+
+@pytest.mark.parametrize("fields", [{"coverage": 0.49}, {"is_met": False}])
+def test_what_was_hardly_observed_or_not_met_did_not_move(fields: dict) -> None:
+    assert not moved_if_possible(visit([0.0], changed=True), visit([2.0], changed=True, **fields))
+
+
+def test_object_that_moved_is_not_tied_to_what_stands_at_its_place() -> None:
+    # Both were doubtful; before moves were looked for, the two first objects shared a place.
+    before, now = visit([0.0], log_odds=[-0.5]), visit([0.0, 2.0], log_odds=[-5.0, -0.5])
+
+    decision = by_evidence(before, now, [[0.8, 0.0]], moves=[move(1, 2)])
+
+    assert [(i.previous, i.current) for i in decision.identities] == [(1, 2)]
+    assert decision.labels1.tolist() == [L.STATIC, L.STATIC, L.MOVED]
+
+
+def test_objects_of_one_place_are_one_and_nothing_says_how_they_moved() -> None:
+    (identity,) = by_evidence(visit([0.0]), visit([0.0]), [[0.8]]).identities
+
+    assert (identity.previous, identity.current, identity.T_world_motion) == (1, 1, None)
+    assert identity.confidence == pytest.approx(0.8)
 
 
 def test_same_place_identities_are_one_to_one() -> None:
@@ -196,19 +240,18 @@ def test_background_is_no_object_whatever_its_evidence(background: tuple[float, 
     # A background that changed, or that nobody met yet, once cost the first object its identity.
     before = visit([0.0, 4.0], background=background)
     now = visit([0.0, 4.0], background=background)
-    seen: list[tuple[list[int], list[int]]] = []
+    asked: list[tuple[set[int], set[int]]] = []
 
     decision = decide_by_evidence(
         before,
         now,
         np.diag([0.8, 0.8]),
-        association(2, 2, {}),
-        lambda left, taken: seen.append((left, taken)) or [],
-        CHANGE,
+        lambda left, taken: asked.append((left, taken)) or [],
+        SETTINGS,
     )
 
     assert {(i.previous, i.current) for i in decision.identities} == {(1, 1), (2, 2)}
-    assert seen == []
+    assert asked == [(set(), set())]
     assert decision.labels0[0] == decision.labels1[0] == L.STATIC
 
 

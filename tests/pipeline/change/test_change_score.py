@@ -30,12 +30,25 @@ def unchanged() -> ObjectEvidence:
         texture_correlation=0.9 + 0.03 * scatter,
         centroid_world=np.zeros((OBJECTS, 3)),
         dissimilarity=-2.2 + 0.1 * scatter,
+        pattern_pixels=np.zeros(OBJECTS),
+        pattern_correlation=np.full(OBJECTS, np.nan),
+        pattern_lost=np.full(OBJECTS, np.nan),
     )
 
 
-def with_object(**values: float) -> ObjectEvidence:
-    """The unchanged objects, the last of them with other values."""
-    evidence = unchanged()
+def patterned() -> ObjectEvidence:
+    """The unchanged objects, all of them printed, and the prints found again."""
+    return replace(
+        unchanged(),
+        pattern_pixels=np.full(OBJECTS, 500.0),
+        pattern_correlation=0.8 + 0.02 * np.linspace(-1, 1, OBJECTS),
+        pattern_lost=np.full(OBJECTS, 0.05),
+    )
+
+
+def with_object(evidence: ObjectEvidence | None = None, **values: float) -> ObjectEvidence:
+    """The unchanged (or given) objects, the last of them with other values."""
+    evidence = unchanged() if evidence is None else evidence
     changed = {name: getattr(evidence, name).astype(float).copy() for name in values}
     for name, value in values.items():
         changed[name][-1] = value
@@ -91,7 +104,70 @@ def test_few_compared_voxels_say_little() -> None:
 def test_what_was_never_compared_is_judged_by_geometry_alone() -> None:
     features = change_features(with_object(compared_count=0, dissimilarity=np.nan, seen_through=0.2))
 
-    assert features[-1].tolist() == [0.2, 0, 0, 0, 0]
+    assert features[-1].tolist() == [0.2, 0, 0, 0, 0, 0]
+
+
+def test_a_lost_pattern_is_a_change_however_the_visits_colours_agree() -> None:
+    lost = with_object(patterned(), pattern_correlation=0.1)
+
+    assert (change_log_odds(patterned(), AGREEING, SETTINGS)[1:] < 0).all()
+    assert log_odds(lost) > 0
+    # Without trust in colours the pattern alone is left; its weight is not damped.
+    pattern = change_features(lost)[-1, 5]
+    assert log_odds(lost, scale=1.0) == pytest.approx(SETTINGS.bias + SETTINGS.pattern_weight * pattern)
+
+
+def test_log_odds_rise_as_the_pattern_is_lost() -> None:
+    odds = [log_odds(with_object(patterned(), pattern_correlation=c)) for c in (0.9, 0.7, 0.5, 0.3, 0.1)]
+
+    assert (np.diff(odds) > 0).all()
+
+
+def test_few_pattern_pixels_say_little_and_none_nothing() -> None:
+    features = [
+        change_features(with_object(patterned(), pattern_correlation=0.1, pattern_pixels=pixels))[-1, 5]
+        for pixels in (0.0, 20.0, 500.0)
+    ]
+
+    assert features[0] == 0 < features[1] < features[2] / 2
+
+
+def test_colours_may_speak_where_the_pattern_is_lost_though_patches_agree() -> None:
+    colours = dict(texture_correlation=0.1, tail_share=0.4, median_residual=0.5, dissimilarity=-2.3)
+    kept = change_features(with_object(patterned(), **colours))[-1]
+    lost = change_features(with_object(patterned(), **colours, pattern_correlation=0.1))[-1]
+
+    assert (lost[2:5] > kept[2:5] + 1).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "noise"), [("dissimilarity", 1, 2.0), ("median_residual", 2, 0.3)]
+)
+def test_noise_of_the_visits_widens_the_spread(name: str, column: int, noise: float) -> None:
+    # The same deviation of the last object is worth less where all others scatter widely.
+    quiet = unchanged()
+    centre = float(np.median(getattr(quiet, name)))
+    noisy = replace(quiet, **{name: centre + noise * np.linspace(-1, 1, OBJECTS)})
+    far = {name: centre + 2 * noise}
+
+    # The features are cut off from above by what the patches allow; unlike patches allow them all.
+    allowed = {} if name == "dissimilarity" else {"dissimilarity": 3.0}
+    values = [change_features(with_object(e, **{**allowed, **far}))[-1, column] for e in (quiet, noisy)]
+
+    assert 0 < values[1] < 0.9 * values[0]
+
+
+def test_pattern_spread_never_widens() -> None:
+    # A pose error blurs all patterns; were it to widen the spread, lost ones would not stand out any more.
+    middle = np.arctanh(0.8)
+    wide = replace(patterned(), pattern_correlation=np.tanh(middle + 0.9 * np.linspace(-1, 1, OBJECTS)))
+
+    values = [
+        change_features(with_object(e, pattern_correlation=np.tanh(middle - 0.6)))[-1, 5]
+        for e in (patterned(), wide)
+    ]
+
+    assert values[1] == pytest.approx(values[0], rel=0.1)
 
 
 def test_the_stored_table_gives_the_same_log_odds_again() -> None:

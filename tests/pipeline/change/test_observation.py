@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_matrix
 
 from pipeline.change.appearance import AppearanceResidual
-from pipeline.change.evidence import object_evidence
+from pipeline.change.evidence import ObjectEvidence, object_evidence
 from pipeline.change.observation import DepthWindow, Glimpse, Observation, glimpse
 from pipeline.change.observe import observe
+from pipeline.correspondence.pattern import PatternAgreement
 from pipeline.mapping.front_end import SessionGeometry
 from pipeline.mapping.surface import FusedSurface
 from pipeline.settings import ObservationSettings, Settings
@@ -151,9 +152,15 @@ def test_observations_replay_from_their_sparse_parts() -> None:
     assert whole.log_colours == pytest.approx(replayed.log_colours, abs=1e-6)
 
 
-def evidence(instances: list[int], observed: list[bool], through: list[bool], met: list[bool] | None = None):
+def evidence(
+    instances: list[int],
+    observed: list[bool],
+    through: list[bool],
+    met: list[bool] | None = None,
+    pattern: PatternAgreement | None = None,
+) -> ObjectEvidence:
     count = len(instances)
-    residual = AppearanceResidual(np.zeros(count, bool), np.zeros((count, 3), np.float32), 0.03)
+    residual = AppearanceResidual(np.zeros(count, bool), np.zeros((count, 3), np.float32), 0.03, np.zeros(3))
     points = np.stack([np.arange(count), np.zeros(count), np.zeros(count)], axis=1).astype(np.float32)
     normals = np.tile(np.array([0, 0, 1], np.float32), (count, 1))
     return object_evidence(
@@ -167,6 +174,7 @@ def evidence(instances: list[int], observed: list[bool], through: list[bool], me
         normals,
         points,
         np.full(max(instances) + 1, np.nan),
+        PatternAgreement.empty(max(instances)) if pattern is None else pattern,
     )
 
 
@@ -186,6 +194,15 @@ def test_evidence_counts_only_what_was_met_so_far() -> None:
     assert found.voxel_count[1] == 2
     assert found.coverage[1] == 0.5
     assert found.centroid_world[1].tolist() == [1.0, 0, 0]
+
+
+def test_evidence_keeps_the_pattern_of_its_moment_while_the_sums_go_on_growing() -> None:
+    pattern = PatternAgreement(np.array([0.0, 4.0]), np.array([0.0, 3.0]), np.array([0.0, 1.0]))
+    found = evidence([1, 1], [1, 1], [0, 0], pattern=pattern)
+    pattern.add(pattern)
+
+    assert (found.pattern_pixels[1], found.pattern_correlation[1], found.pattern_lost[1]) == (4, 0.75, 0.25)
+    assert np.isnan(found.pattern_correlation[0])
 
 
 def _wall_visit(folder: Path, y_m: float, xs: list[float]) -> SessionGeometry:
