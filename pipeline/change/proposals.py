@@ -21,6 +21,7 @@ from pipeline.mapping.surface import FusedSurface
 from pipeline.settings import ObservationSettings, ProposalSettings
 
 _REACH_STEPS = 12
+_ALIKE = -0.2
 _UNLIKE_MEDIANS = 3.5
 _LEAST_CHROMA = 0.04
 _TRUST_THROUGH, _TRUST_COLOUR, _TRUST_HIT, _TRUST_NOTHING = 2.0, 0.1, 0.05, 0.01
@@ -34,10 +35,12 @@ class ChangeProposals:
 
     Attributes:
         is_changed: (M,) voxels taken for changed, spread up to the edges of things.
+        is_evident: (M,) those of them that the other visit did not find in place and alike.
         proof: (M,) 1 where the other visit saw through the voxel, less where it only looks unlike, else 0.
     """
 
     is_changed: NDArray[np.bool_]
+    is_evident: NDArray[np.bool_]
     proof: NDArray[np.float32]
 
 
@@ -66,7 +69,9 @@ def propose_changes(
     sign[through], trust[through] = 1.0, _TRUST_THROUGH
     is_unlike = compared & (unlikeness > 0) & ~is_noise
     proof = np.where(through, 1.0, np.where(is_unlike, settings.unlike_proof, 0.0)).astype(np.float32)
-    return ChangeProposals(_spread(surface, sign, trust, proof > 0, settings) > 0, proof)
+    spread = _spread(surface, sign, trust, proof > 0, settings)
+    is_denied = (seen.hit_count > 0) & ~through & ~(compared & (unlikeness > _ALIKE))
+    return ChangeProposals(spread > 0, (spread > 0) & ~is_denied, proof)
 
 
 def _unlikeness(

@@ -62,7 +62,9 @@ def find_objects(
     objects = part_pieces(
         surface, merger.finish(), discovery.loose_piece_voxels, discovery.loose_reach_voxels
     )
-    objects = refine_by_change(surface, objects, proposals.is_changed, proposals.proof, discovery)
+    objects = refine_by_change(
+        surface, objects, proposals.is_changed, proposals.is_evident, proposals.proof, discovery
+    )
     return number_instances(geometry, objects, ~is_noise, discovery.min_voxels, discovery.min_views)
 
 

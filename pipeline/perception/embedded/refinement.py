@@ -17,20 +17,24 @@ def refine_by_change(
     surface: FusedSurface,
     segments: NDArray[np.integer],
     changed: Mask,
+    evident: Mask,
     proof: NDArray[np.floating],
     settings: DiscoverySettings,
 ) -> NDArray[np.int32]:
     """Cut segments where change ends: no object is half changed.
 
-    Changed parts of segments that did not change as a whole (background included), linked within 2.2 voxels,
-    form regions. A region that touches a mostly changed segment at least half its size is the rest of that
-    object and joins it; any other becomes a new segment. Unchanged parts of mostly changed segments become
-    new segments where they are a fair share of it. New segments are numbered after the given ones.
+    Evidently changed parts of segments that did not change as a whole (background included), linked within
+    2.2 voxels, form regions. A region that touches a mostly changed segment at least half its size is the
+    rest of that object and joins it; any other becomes a new segment. Unchanged parts of mostly changed
+    segments become new segments where they are a fair share of them. New segments are numbered after the
+    given ones.
 
     Args:
         surface: the fused surface of M voxels.
         segments: (M,) segment numbers, 0 = background.
         changed: (M,) voxels that changed between the visits.
+        evident: (M,) changed voxels that may be cut out of what did not change as a whole; elsewhere changes
+            that were only concluded from those around count too.
         proof: (M,) how sure that is; regions of little proof in all are left where they are.
         settings: sizes and shares.
 
@@ -53,7 +57,7 @@ def refine_by_change(
         refined[unchanged] = following - 1 + number
         following += int(number.max())
 
-    regions = _regions(surface, np.flatnonzero(changed & ~is_whole[segments]))
+    regions = _regions(surface, np.flatnonzero(changed & evident & ~is_whole[segments]))
     in_region = regions.number[regions.order]
     sure = np.bincount(in_region, proof[regions.order], regions.count) >= settings.change_region_proof
     for region in np.flatnonzero(sure & (regions.sizes >= settings.change_region_voxels)):
