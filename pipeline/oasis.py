@@ -9,6 +9,7 @@ from pipeline.assemble import assemble
 from pipeline.association.moves import moves_table
 from pipeline.change.change_score import appearance_trust
 from pipeline.change.decide import decide
+from pipeline.change.proposals import propose_changes
 from pipeline.correspondence.compare import Comparison, VisitImages
 from pipeline.correspondence.pattern_comparison import compare_patterns
 from pipeline.mapping.find_objects import find_objects
@@ -31,9 +32,16 @@ class OasisMethod:
         is_noise = (observation.is_noise0, observation.is_noise1)
 
         def find(visit: int) -> SessionObjects:
+            proposals = propose_changes(
+                mapped.geometries[visit],
+                observed[visit],
+                is_noise[visit],
+                settings.observation,
+                settings.proposals,
+            )
             return find_objects(
                 mapped.geometries[visit],
-                observed[visit].is_seen_through(settings.observation),
+                proposals,
                 is_noise[visit],
                 mask_generator(settings),
                 mapped.extractor,

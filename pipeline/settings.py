@@ -170,6 +170,33 @@ class DiscoverySettings:
     attach_voxels: float = setting(3.0, "floating pieces join the neighbour within this reach", unit="voxels")
     whole_change: float = setting(0.5, "a segment changed by more than this share changed as a whole")
     change_region_voxels: int = setting(30, "changed regions from this size on become objects", unit="voxels")
+    unchanged_share: float = setting(
+        0.15, "an unchanged part of a changed segment is parted from this share on"
+    )
+    change_region_proof: float = setting(
+        15.0, "a changed region has so many voxels that were seen through, or more that look unlike"
+    )
+    loose_piece_voxels: int = setting(
+        150, "loose pieces of an object from this size on are objects", unit="voxels"
+    )
+    loose_reach_voxels: float = setting(
+        8.0, "smaller ones join the nearest object within reach", unit="voxels"
+    )
+
+
+@dataclass(frozen=True)
+class ProposalSettings:
+    """Voxels that changed, from which objects are corrected."""
+
+    usual_percentile: float = setting(
+        98.5, "colours that differ more than at this share of all places are unlike", unit="%"
+    )
+    lightness_weight: float = setting(0.4, "weight of lightness (shadows move) against tint")
+    unlike_proof: float = setting(0.2, "weight of a voxel that looks unlike against one seen through")
+    edge_sigma_lab: float = setting(
+        5.0, "changes hardly spread over edges of this contrast", unit="Lab units"
+    )
+    spread_steps: int = setting(60, "steps of the random walk that spreads changes", least=0)
 
 
 @dataclass(frozen=True)
@@ -383,6 +410,7 @@ class Settings:
     perception: PerceptionSettings = field(default_factory=PerceptionSettings)
     descriptor: DescriptorSettings = field(default_factory=DescriptorSettings)
     discovery: DiscoverySettings = field(default_factory=DiscoverySettings)
+    proposals: ProposalSettings = field(default_factory=ProposalSettings)
     merge: MergeSettings = field(default_factory=MergeSettings)
     observation: ObservationSettings = field(default_factory=ObservationSettings)
     correspondence: CorrespondenceSettings = field(default_factory=CorrespondenceSettings)

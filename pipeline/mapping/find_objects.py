@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.association.aggregation import patch_owners, patch_shares
+from pipeline.change.proposals import ChangeProposals
 from pipeline.mapping.front_end import SessionGeometry
 from pipeline.mapping.merging import ObjectMerger
-from pipeline.mapping.objects import SessionObjects, number_instances, remove_noise
+from pipeline.mapping.objects import SessionObjects, number_instances, part_pieces
 from pipeline.mapping.projection import visible_points
 from pipeline.mapping.voxel_blocks import VoxelBlocks
 from pipeline.perception.embedded.refinement import refine_by_change
@@ -21,7 +22,7 @@ from pipeline.settings import Settings
 
 def find_objects(
     geometry: SessionGeometry,
-    is_seen_through: NDArray[np.bool_],
+    proposals: ChangeProposals,
     is_noise: NDArray[np.bool_],
     generator: MaskGenerator,
     extractor: FeatureExtractor,
@@ -33,8 +34,8 @@ def find_objects(
 
     Args:
         geometry: the mapped visit.
-        is_seen_through: (M,) voxels that are empty in the other visit: what came or went as one is an object
-            even where masks missed it.
+        proposals: voxels that changed between the visits: what came or went as one is an object even where
+            masks missed it.
         is_noise: (M,) voxels that their own visit denies; they neither make an object nor a change.
         generator: makes the masks.
         extractor, features: for the semantic similarity of masks.
@@ -57,13 +58,14 @@ def find_objects(
         candidates = blocks.in_view(camera, keyframe.T_world_camera, settings.image.max_depth_m)
         projected = visible_points(surface.points_world, candidates, camera, keyframe.T_world_camera)
         merger.add(masks, voxels, mask_tokens(masks, features(k), extractor), projected)
-    objects = remove_noise(surface, merger.finish())
+    discovery = settings.discovery
+    objects = part_pieces(
+        surface, merger.finish(), discovery.loose_piece_voxels, discovery.loose_reach_voxels
+    )
     objects = refine_by_change(
-        surface, objects, is_seen_through & ~is_noise, settings.discovery.change_region_voxels
+        surface, objects, proposals.is_changed, proposals.is_evident, proposals.proof, discovery
     )
-    return number_instances(
-        geometry, objects, ~is_noise, settings.discovery.min_voxels, settings.discovery.min_views
-    )
+    return number_instances(geometry, objects, ~is_noise, discovery.min_voxels, discovery.min_views)
 
 
 def mask_tokens(

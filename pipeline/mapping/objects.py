@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from pipeline.mapping.front_end import SessionGeometry
 from pipeline.mapping.surface import FusedSurface
 
-# Pieces of an object smaller than this share of its largest piece are noise.
+# Pieces of an object smaller than this share of its largest piece are not taken for part of it.
 MIN_PIECE_SHARE = 0.1
 _FEW_KEYFRAMES = 12
 MIN_VIEW_PIXELS = 12
@@ -38,14 +39,19 @@ class SessionObjects:
         return np.where(voxels >= 0, self.instance_of_voxel[np.maximum(voxels, 0)], 0).astype(np.int32)
 
 
-def remove_noise(surface: FusedSurface, objects: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Drop the small disconnected pieces of each object.
+def part_pieces(
+    surface: FusedSurface, objects: NDArray[np.int32], least_own: int, reach_voxels: float
+) -> NDArray[np.int32]:
+    """Part the small disconnected pieces of each object from it.
+
+    A piece of under a tenth of the object's largest becomes an object if it has ``least_own`` voxels;
+    otherwise it joins the nearest object within reach: surfaces seen at a grazing angle are sparse.
 
     Args:
         objects: (M,) object of each voxel, 0 = none.
 
     Returns:
-        (M,) the same numbers, 0 where a piece was dropped.
+        (M,) the same numbers, new ones above them for new objects, 0 where a piece was dropped.
     """
     rows, columns = surface.neighbours.nonzero()
     inside = (objects[rows] > 0) & (objects[rows] == objects[columns])
@@ -54,10 +60,33 @@ def remove_noise(surface: FusedSurface, objects: NDArray[np.int32]) -> NDArray[n
     )
     _, piece = connected_components(links, directed=False)
     size = np.bincount(piece)
-    largest = np.zeros(int(objects.max(initial=0)) + 1, np.int64)
-    np.maximum.at(largest, objects, size[piece])
-    keep = size[piece] >= MIN_PIECE_SHARE * largest[objects]
-    return np.where(keep, objects, 0).astype(np.int32)
+    owner = np.zeros(len(size), np.int32)
+    owner[piece] = objects
+    count = int(objects.max(initial=0)) + 1
+    largest = np.zeros(count, np.int64)
+    np.maximum.at(largest, owner, size)
+    is_loose = (owner > 0) & (size < MIN_PIECE_SHARE * largest[owner])
+    is_own = is_loose & (size >= least_own)
+    owner[is_own] = count + np.arange(int(is_own.sum()))
+    owner[is_loose & ~is_own] = 0
+    parted: NDArray[np.int32] = owner[piece]
+    return join_nearest(surface, parted, (objects > 0) & (parted == 0), reach_voxels)
+
+
+def join_nearest(
+    surface: FusedSurface, objects: NDArray[np.int32], loose: NDArray[np.bool_], reach_voxels: float
+) -> NDArray[np.int32]:
+    """Give the ``loose`` voxels (M,) to the object of the nearest voxel that has one, if it is in reach."""
+    joined = objects.copy()
+    held, loose_voxels = np.flatnonzero(objects > 0), np.flatnonzero(loose)
+    if not len(held) or not len(loose_voxels):
+        return joined
+    distance, nearest = cKDTree(surface.points_world[held]).query(
+        surface.points_world[loose_voxels], distance_upper_bound=reach_voxels * surface.voxel_size_m
+    )
+    near = np.isfinite(distance)
+    joined[loose_voxels[near]] = objects[held[nearest[near]]]
+    return joined
 
 
 def number_instances(

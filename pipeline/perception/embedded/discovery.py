@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.mapping.objects import join_nearest
 from pipeline.mapping.surface import FusedSurface
 from pipeline.perception.embedded.attachment import Attachment
 from pipeline.perception.embedded.components import Pieces, first_seen_order
@@ -34,4 +35,5 @@ def discover_objects(surface: FusedSurface, settings: DiscoverySettings) -> NDAr
     labels = np.zeros(len(nodes), np.int64)
     held = nodes >= 0
     labels[held] = attachment.roots()[nodes[held]] + 1
-    return first_seen_order(labels, settings.min_voxels)
+    segments = first_seen_order(labels, settings.min_voxels)
+    return join_nearest(surface, segments, ~is_structure & (segments == 0), settings.loose_reach_voxels)

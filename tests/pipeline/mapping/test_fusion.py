@@ -17,7 +17,7 @@ from pipeline.mapping.colours import MIN_SHARED_PIXELS, VoxelColours
 from pipeline.mapping.dense_map import dense_map
 from pipeline.mapping.front_end import SessionGeometry
 from pipeline.mapping.fusion import VoxelFusion
-from pipeline.mapping.objects import number_instances, remove_noise
+from pipeline.mapping.objects import number_instances, part_pieces
 from pipeline.mapping.scale import voxel_size_m
 from pipeline.mapping.voxel_blocks import VoxelBlocks
 from pipeline.settings import Settings
@@ -111,23 +111,41 @@ def test_keyframes_that_share_too_little_keep_their_exposure() -> None:
 
 
 def chain(sizes: list[int]) -> SimpleNamespace:
-    """Disconnected rows of voxels of the given lengths."""
-    rows, start = [], 0
+    """Rows of voxels of the given lengths, a voxel apart in a row and ten between rows."""
+    rows, start, points = [], 0, []
     for size in sizes:
         rows += [(i, i + 1) for i in range(start, start + size - 1)]
+        points += list(np.arange(size) + (points[-1] + 10 if points else 0))
         start += size
     a, b = np.array(rows).reshape(-1, 2).T
     links = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), shape=(start, start)).tocsr()
-    return SimpleNamespace(neighbours=links)
+    positions = np.column_stack([points, np.zeros((start, 2))]) * 0.02
+    return SimpleNamespace(neighbours=links, points_world=positions, voxel_size_m=0.02)
 
 
-def test_small_loose_pieces_of_an_object_are_noise() -> None:
+def test_loose_pieces_out_of_reach_are_dropped() -> None:
     # Object 1: pieces of 40, 4 and 3 voxels (10 % of 40 are 4); object 2: one piece of 3.
     objects = np.repeat([1, 1, 1, 2], [40, 4, 3, 3])
 
-    cleaned = remove_noise(chain([40, 4, 3, 3]), objects)
+    parted = part_pieces(chain([40, 4, 3, 3]), objects, least_own=150, reach_voxels=8)
 
-    assert cleaned.tolist() == np.repeat([1, 1, 0, 2], [40, 4, 3, 3]).tolist()
+    assert parted.tolist() == np.repeat([1, 1, 0, 2], [40, 4, 3, 3]).tolist()
+
+
+def test_loose_pieces_join_the_nearest_object_in_reach() -> None:
+    objects = np.repeat([1, 2, 1], [100, 30, 3])
+
+    parted = part_pieces(chain([100, 30, 3]), objects, least_own=150, reach_voxels=12.5)
+
+    assert parted.tolist() == np.repeat([1, 2, 2], [100, 30, 3]).tolist()
+
+
+def test_large_loose_pieces_are_objects_of_their_own() -> None:
+    objects = np.repeat([1, 1, 2], [100, 6, 30])
+
+    parted = part_pieces(chain([100, 6, 30]), objects, least_own=6, reach_voxels=8)
+
+    assert parted.tolist() == np.repeat([1, 3, 2], [100, 6, 30]).tolist()
 
 
 def _visit(views: list[np.ndarray]) -> SimpleNamespace:
