@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pipeline.association.aggregation import MatchEvidence, PatchShares, patch_owners, patch_shares
 from pipeline.correspondence.covisibility import CovisibilityIndex, PatchView, patch_view, patch_warp
 from pipeline.correspondence.heatmaps import geometric_heatmap, semantic_heatmap
-from pipeline.correspondence.matching import best_nearby, match
+from pipeline.correspondence.matching import best_nearby, correlation, match
 from pipeline.correspondence.place_similarity import PlaceSimilarity
 from pipeline.errors import SceneMismatchError
 from pipeline.mapping.front_end import SessionGeometry
@@ -36,12 +36,17 @@ _PAIRS_AT_ONCE = 16
 
 @dataclass(frozen=True)
 class _PairOutcome:
-    """What comparing one pair of keyframes gave; see ``DenseMatches`` and ``best_nearby``."""
+    """What comparing one pair of keyframes gave; see ``DenseMatches`` and ``best_nearby``.
+
+    ``relit0`` and ``relit1`` are those of the heatmaps, after ``FeatureExtractor.relit``.
+    """
 
     links: PatchLinks
     correspondences: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]
     nearby0: NDArray[np.float32]
     nearby1: NDArray[np.float32]
+    relit0: NDArray[np.float32]
+    relit1: NDArray[np.float32]
     light: NDArray[np.float64]
 
 
@@ -157,15 +162,18 @@ def compare(
         k0, k1 = pair
         view0, view1 = covisibility.views0[k0], covisibility.views1[k1]
         stored0, stored1 = previous.features(k0), current.features(k1)
-        into_previous = patch_warp(view1, view0)
+        into_current, into_previous = patch_warp(view0, view1), patch_warp(view1, view0)
         light = extractor.light(stored0, stored1, into_previous)
         matches = match(*extractor.comparable(stored0, stored1, light))
+        relit = correlation(*extractor.relit(stored0, stored1, into_previous))
         shape0, shape1 = stored0.shape[:2], stored1.shape[:2]
         return _PairOutcome(
             links=matches.links((shape0[0], shape0[1]), (shape1[0], shape1[1])),
             correspondences=matches.correspondences(),
-            nearby0=best_nearby(matches.correlation, patch_warp(view0, view1), shape1, radius),
+            nearby0=best_nearby(matches.correlation, into_current, shape1, radius),
             nearby1=best_nearby(matches.correlation.T, into_previous, shape0, radius),
+            relit0=best_nearby(relit, into_current, shape1, radius),
+            relit1=best_nearby(relit.T, into_previous, shape0, radius),
             light=light,
         )
 
@@ -178,10 +186,11 @@ def compare(
                 p, q, score = outcome.correspondences
                 submap = current.geometry.keyframes[k1].submap
                 evidence[submap].add(owners0[p], owners1[q], score)
-                for visit, (k, nearby, shares) in enumerate(
-                    ((k0, outcome.nearby0, shares0), (k1, outcome.nearby1, shares1))
+                best[0].add(k0, outcome.relit0)
+                best[1].add(k1, outcome.relit1)
+                for visit, (nearby, shares) in enumerate(
+                    ((outcome.nearby0, shares0), (outcome.nearby1, shares1))
                 ):
-                    best[visit].add(k, nearby)
                     similarity[visit][submap].add(shares, nearby.reshape(-1))
                 lights.append(outcome.light)
             on_step(begin + len(some), steps)

@@ -64,16 +64,22 @@ def match(features0: NDArray[np.float32], features1: NDArray[np.float32]) -> Den
         features1: F1, (N1, d) of the current keyframe.
     """
     with torch.inference_mode():
-        correlation = torch.from_numpy(features0) @ torch.from_numpy(features1).T
-        forward_score, forward = correlation.max(dim=1)
-        backward_score, backward = correlation.max(dim=0)
+        scores = torch.from_numpy(features0) @ torch.from_numpy(features1).T
+        forward_score, forward = scores.max(dim=1)
+        backward_score, backward = scores.max(dim=0)
     return DenseMatches(
-        correlation.numpy(), forward.numpy(), forward_score.numpy(), backward.numpy(), backward_score.numpy()
+        scores.numpy(), forward.numpy(), forward_score.numpy(), backward.numpy(), backward_score.numpy()
     )
 
 
+def correlation(features0: NDArray[np.float32], features1: NDArray[np.float32]) -> NDArray[np.float32]:
+    """C alone, (N0, N1) (Eq. 1); arguments as in :func:`match`."""
+    with torch.inference_mode():
+        return np.asarray((torch.from_numpy(features0) @ torch.from_numpy(features1).T).numpy())
+
+
 def best_nearby(
-    correlation: NDArray[np.float32], warp: PatchWarp, into_shape: tuple[int, int], radius: int
+    scores: NDArray[np.float32], warp: PatchWarp, into_shape: tuple[int, int], radius: int
 ) -> NDArray[np.float32]:
     """Best correlation of each patch among those around its expected place.
 
@@ -81,7 +87,7 @@ def best_nearby(
     be compared with that place.
 
     Args:
-        correlation: (N, N_into), rows are the patches of ``warp``.
+        scores: (N, N_into) correlations, rows are the patches of ``warp``.
         warp: where they lie in the other keyframe.
         into_shape: (H_f, W_f) of the other keyframe.
         radius: patches searched in each direction.
@@ -101,5 +107,5 @@ def best_nearby(
     window = (window_row * columns + window_column).reshape(len(visible), len(offsets) ** 2)
     best = np.full(height * width, np.nan, np.float32)
     if len(visible):
-        best[visible] = np.take_along_axis(correlation[visible], window, axis=1).max(axis=1)
+        best[visible] = np.take_along_axis(scores[visible], window, axis=1).max(axis=1)
     return best.reshape(height, width)
