@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import numpy as np
@@ -92,6 +93,17 @@ def load_geometry(
         store=store,
         stride=stride,
     )
+
+
+def save_quality(writer: ResultWriter, name: str, quality: dict[str, Any]) -> None:
+    """Keep what a stage says about itself in the manifest."""
+    writer.save_array(f"quality/{name}", np.frombuffer(json.dumps(quality).encode(), np.uint8))
+
+
+def load_quality(writer: ResultWriter, name: str) -> dict[str, Any]:
+    """What ``save_quality`` kept."""
+    quality: dict[str, Any] = json.loads(writer.load_array(f"quality/{name}", mmap=False).tobytes())
+    return quality
 
 
 def save_observation(writer: ResultWriter, observation: MutualObservation) -> None:

@@ -10,6 +10,7 @@ STAGES: tuple[tuple[str, str], ...] = (
     ("open", "Opening the recordings"),
     ("map_previous", "Mapping the previous visit"),
     ("map_current", "Mapping the current visit"),
+    ("register", "Laying the visits on each other"),
     ("observe", "Checking what each visit saw of the other"),
     ("objects", "Finding objects"),
     ("compare", "Comparing keyframes"),

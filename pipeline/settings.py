@@ -80,6 +80,45 @@ class SurfaceSettings:
 
 
 @dataclass(frozen=True)
+class RegistrationSettings:
+    """Laying the current visit on the previous one before they are compared."""
+
+    enabled: bool = setting(True, "correct small pose errors between the visits; off = poses as recorded")
+    samples: int = setting(3000, "surface points that take part, even over directions", least=100)
+    reach_m: float = setting(0.1, "least distance within which counterparts are looked for first", unit="m")
+    reach_voxels: float = setting(4.0, "the same, in voxels", unit="voxels")
+    reach_deg: float = setting(2.0, "the same, as a turn of the whole visit about its middle", unit="deg")
+    max_reach_m: float = setting(1.0, "counterparts are never looked for farther away", unit="m")
+    last_reach_voxels: float = setting(2.0, "counterparts lie this near at the end", unit="voxels")
+    loose_below: float = setting(
+        0.01, "directions of smaller eigenvalues of the normal matrix are left as they are"
+    )
+    max_cost_ratio: float = setting(
+        0.95, "a correction is made when the robust cost falls at least to this share"
+    )
+    max_translation_m: float = setting(0.3, "a larger correction is no pose error and is not made", unit="m")
+    max_rotation_deg: float = setting(5.0, "a larger correction is no pose error and is not made", unit="deg")
+    # Off: poses get better, but no change score was seen to (benchmarks/pose_noise.py, jitter).
+    keyframes: bool = setting(False, "correct single keyframes too, where most of them need it")
+    keyframe_samples: int = setting(1000, "pixels of a keyframe that take part", least=100)
+    keyframe_translation_m: float = setting(0.02, "expected error of a keyframe's pose", unit="m")
+    keyframe_rotation_deg: float = setting(1.0, "expected error of a keyframe's pose", unit="deg")
+    keyframe_matches: float = setting(
+        20.0, "what all matches of a keyframe are worth in independent ones, against that expectation"
+    )
+    keyframe_max_cost_ratio: float = setting(0.9, "as max_cost_ratio, for a keyframe")
+    keyframe_max_translation_m: float = setting(0.1, "as max_translation_m, for a keyframe", unit="m")
+
+    def reaches_m(self, voxel_m: float, radius_m: float) -> tuple[float, float]:
+        """Within what distance counterparts are looked for at first and at the end; of a view or map of a
+        radius (metres)."""
+        last_m = self.last_reach_voxels * voxel_m
+        turned_m = math.radians(self.reach_deg) * radius_m
+        first_m = max(self.reach_m, self.reach_voxels * voxel_m, turned_m)
+        return max(min(first_m, self.max_reach_m), last_m), last_m
+
+
+@dataclass(frozen=True)
 class PerceptionSettings:
     """Which backends see."""
 
@@ -273,6 +312,7 @@ class Settings:
     image: ImageSettings = field(default_factory=ImageSettings)
     keyframes: KeyframeSettings = field(default_factory=KeyframeSettings)
     surface: SurfaceSettings = field(default_factory=SurfaceSettings)
+    registration: RegistrationSettings = field(default_factory=RegistrationSettings)
     perception: PerceptionSettings = field(default_factory=PerceptionSettings)
     descriptor: DescriptorSettings = field(default_factory=DescriptorSettings)
     discovery: DiscoverySettings = field(default_factory=DiscoverySettings)

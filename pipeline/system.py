@@ -12,6 +12,7 @@ from hashlib import blake2b
 from itertools import count
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ from pipeline.correspondence.compare import (
 )
 from pipeline.errors import OasisError
 from pipeline.mapping.dense_map import dense_map
-from pipeline.mapping.front_end import KeyframeSinks, SessionGeometry, map_session, reopen_stores
+from pipeline.mapping.front_end import KeyframeSinks, SessionGeometry, map_again, map_session, reopen_stores
 from pipeline.mapping.keyframes import select_keyframes
 from pipeline.mapping.objects import SessionObjects
 from pipeline.mapping.scale import voxel_size_m
@@ -37,6 +38,7 @@ from pipeline.perception.registry import feature_extractor
 from pipeline.progress import ProgressEvent, Report, Warned, silent
 from pipeline.readers import open_session
 from pipeline.readers.fingerprint import fingerprint
+from pipeline.registration.between_visits import moved_geometry, register
 from pipeline.result import CovisiblePair, KeyframeRecord, Result
 from pipeline.session import Session
 from pipeline.settings import Settings
@@ -45,6 +47,7 @@ from pipeline.store import ResultWriter, finished_result
 # Changes whenever the same inputs and settings would give another result.
 ENGINE_VERSION = 2
 VISITS = ("previous", "current")
+REGISTERED = 2  # the current visit's geometry, fused anew with corrected poses
 
 
 def run(
@@ -113,11 +116,12 @@ class _Run:
         self._writer = writer
         self._report = report
         self._timings_s: dict[str, float] = {}
+        self._registration: dict[str, Any] = {}
         self._warnings = [line for session in sessions for line in session.warnings]
 
     def result(self) -> Result:
         """All stages, in the order in which data walks."""
-        geometries = self._front_end()
+        geometries = self._register(self._front_end())
         covisibility = self._covisibility(geometries)
         observation = self._observe(geometries)
         mapped = self._mapped(geometries, covisibility, observation)
@@ -179,6 +183,38 @@ class _Run:
             self._writer.write_features(visit, frame_index, features)
 
         return KeyframeSinks(write_image, write_features)
+
+    def _register(
+        self, geometries: tuple[SessionGeometry, SessionGeometry]
+    ) -> tuple[SessionGeometry, SessionGeometry]:
+        """The current visit laid on the previous one, in whose world the result stays."""
+        if not self._settings.registration.enabled:
+            return geometries
+        previous, current = geometries
+        folder, warnings = self._writer.work / "register", list[str]()
+        with self._stage("register", warnings) as is_done:
+            if is_done:
+                self._registration = checkpoint.load_quality(self._writer, "registration")
+                if self._writer.has_array(f"geometry_{REGISTERED}/poses"):
+                    stores = reopen_stores(folder, current.surface.voxel_size_m, self._settings)
+                    current = checkpoint.load_geometry(self._writer, REGISTERED, *stores, current.stride)
+            else:
+                found = register(previous, current, self._settings)
+                self._registration = found.quality()
+                if found.warning is not None:
+                    warnings.append(found.warning)
+                    self._report(Warned(found.warning))
+                if found.keyframes is not None and found.keyframes.corrected:
+                    is_lidar = self._sessions[1].depth_source == "lidar"
+                    current = map_again(current, found.poses, self._settings, folder, is_lidar=is_lidar)
+                    checkpoint.save_geometry(self._writer, REGISTERED, current)
+                checkpoint.save_quality(self._writer, "registration", self._registration)
+                self._report(ProgressEvent("register", 1, 1))
+        self._warnings += warnings
+        if self._registration["applied"] and not self._registration.get("keyframes_corrected"):
+            # JSON keeps every bit of a float: a resumed run moves the visit exactly as the first one did.
+            current = moved_geometry(current, np.array(self._registration["T_previous_current"]))
+        return previous, current
 
     def _covisibility(self, geometries: tuple[SessionGeometry, SessionGeometry]) -> Covisibility:
         grids = tuple(self._features(visit, geometries[visit])(0).shape[:2] for visit in range(2))
@@ -322,6 +358,7 @@ class _Run:
             "weights": {"features": self._extractor.weights_hash},
             "quality": {
                 "voxel_size_m": round(visits[0].geometry.surface.voxel_size_m, 6),
+                "registration": self._registration,
                 **outcome.quality,
             },
             "warnings": self._warnings,

@@ -128,59 +128,119 @@ def map_session(
         InputError: fewer than two keyframes could be read.
     """
     stride = settings.image.geometry_stride
-    max_depth_m = min(settings.image.max_depth_m, MAX_STORED_DEPTH_M)
-    grid = TsdfGrid(voxel_size_m, settings.surface.truncation_voxels, max_depth_m)
-    submaps = SubmapSurfaces(folder, grid)
-    store = KeyframeStore(folder)
-    fusion, colours = VoxelFusion(voxel_size_m), VoxelColours()
-    is_lidar = session.depth_source == "lidar"
-
-    def new_submap() -> TsdfSubmap | AccumulatedSubmap:
-        return AccumulatedSubmap(voxel_size_m) if is_lidar else TsdfSubmap(grid)
-
-    submap, submap_index = new_submap(), 0
-    keyframes: list[MappedKeyframe] = []
+    builder = _GeometryBuilder(voxel_size_m, settings, folder, is_lidar=session.depth_source == "lidar")
     for done, frame, rgb, depth in _decoded(session, frame_positions, settings, warn):
-        k = len(keyframes)
         sinks.image(frame.index, rgb)
         sinks.features(frame.index, extractor.describe(rgb))
-        depth = np.where(depth <= max_depth_m, depth, 0)[::stride, ::stride]
-        camera = frame.camera.strided(stride)
-        geometry = depth_geometry(depth, camera, settings.surface.min_incidence_cosine)
-        reliable = geometry.is_reliable
-        points = transform_points(frame.T_world_camera, geometry.points_camera[reliable])
-        normals = rotate_points(frame.T_world_camera[:3, :3], geometry.normals_camera[reliable])
+        depth = np.where(depth <= builder.max_depth_m, depth, 0)[::stride, ::stride]
         small = np.ascontiguousarray(cv2.blur(rgb, (_COLOUR_BLUR_PX, _COLOUR_BLUR_PX))[::stride, ::stride])
-        lab = cv2.cvtColor(small.astype(np.float32) / 255, cv2.COLOR_RGB2Lab)
-        voxels = np.full(depth.shape, -1, np.int32)
-        voxels[reliable] = fusion.add(points, normals, lab[reliable], frame.T_world_camera)
-        colours.add(voxels[reliable], small[reliable])
-        store.save(k, depth, small, voxels)
-        if submap.keyframe_count == settings.keyframes.submap_size:
-            submap.save(submaps.path(submap_index))
-            submap, submap_index = new_submap(), submap_index + 1
-        submap.integrate(depth, camera, frame.T_world_camera)
-        keyframes.append(
-            MappedKeyframe(frame.index, frame.timestamp_s, frame.camera, frame.T_world_camera, submap_index)
-        )
+        builder.add(frame.index, frame.timestamp_s, frame.camera, frame.T_world_camera, depth, small)
         on_keyframe(done)
-    if len(keyframes) < 2:
+    if builder.keyframe_count < 2:
         raise InputError(
-            f"{session.path}: only {len(keyframes)} of {len(frame_positions)} keyframes can be used",
+            f"{session.path}: only {builder.keyframe_count} of {len(frame_positions)} keyframes can be used",
             "a visit needs at least 2; `oasisview check` says what is wrong with the others",
         )
-    submap.save(submaps.path(submap_index))
-    surface, store.remap, first_keyframe = fusion.finish(settings.surface.min_samples)
-    return SessionGeometry(
-        keyframes=tuple(keyframes),
-        surface=surface,
-        first_keyframe=first_keyframe,
-        log_colours=colours.finish(store.remap, len(surface.points_world)),
-        log_gains=np.array(colours.log_gains).reshape(-1, 3),
-        submaps=submaps,
-        store=store,
-        stride=stride,
-    )
+    return builder.finish()
+
+
+def map_again(
+    geometry: SessionGeometry,
+    poses: Sequence[NDArray[np.float64]],
+    settings: Settings,
+    folder: Path,
+    *,
+    is_lidar: bool,
+) -> SessionGeometry:
+    """A mapped visit fused anew with other poses, from what is stored of its keyframes.
+
+    Args:
+        geometry: the visit.
+        poses: (4, 4) ``T_world_camera`` of each keyframe.
+        settings: of the run.
+        folder: where the new per-keyframe arrays and submaps go; not the visit's own.
+        is_lidar: whether a LiDAR measured the depth.
+    """
+    builder = _GeometryBuilder(geometry.surface.voxel_size_m, settings, folder, is_lidar=is_lidar)
+    for k, (keyframe, pose) in enumerate(zip(geometry.keyframes, poses, strict=True)):
+        depth, small = geometry.store.depth(k), geometry.store.rgb(k)
+        builder.add(keyframe.frame_index, keyframe.timestamp_s, keyframe.camera, pose, depth, small)
+    return builder.finish()
+
+
+class _GeometryBuilder:
+    """The geometry of a visit under construction, keyframe by keyframe."""
+
+    def __init__(self, voxel_size_m: float, settings: Settings, folder: Path, *, is_lidar: bool) -> None:
+        self._settings = settings
+        self._is_lidar = is_lidar
+        self._voxel_size_m = voxel_size_m
+        self._store, self._submaps = reopen_stores(folder, voxel_size_m, settings)
+        self._fusion, self._colours = VoxelFusion(voxel_size_m), VoxelColours()
+        self._submap = self._new_submap()
+        self._submap_index = 0
+        self._keyframes: list[MappedKeyframe] = []
+
+    @property
+    def max_depth_m(self) -> float:
+        """Farther depth is not mapped."""
+        return min(self._settings.image.max_depth_m, MAX_STORED_DEPTH_M)
+
+    @property
+    def keyframe_count(self) -> int:
+        """Keyframes added so far."""
+        return len(self._keyframes)
+
+    def add(
+        self,
+        frame_index: int,
+        timestamp_s: float | None,
+        camera: PinholeCamera,
+        T_world_camera: NDArray[np.float64],
+        depth: NDArray[np.float32],
+        small: NDArray[np.uint8],
+    ) -> None:
+        """Fuse depth (h, w) metres and blurred colour (h, w, 3), strided; ``camera`` is the whole one."""
+        settings = self._settings
+        strided = camera.strided(settings.image.geometry_stride)
+        geometry = depth_geometry(depth, strided, settings.surface.min_incidence_cosine)
+        reliable = geometry.is_reliable
+        points = transform_points(T_world_camera, geometry.points_camera[reliable])
+        normals = rotate_points(T_world_camera[:3, :3], geometry.normals_camera[reliable])
+        lab = cv2.cvtColor(small.astype(np.float32) / 255, cv2.COLOR_RGB2Lab)
+        voxels = np.full(depth.shape, -1, np.int32)
+        voxels[reliable] = self._fusion.add(points, normals, lab[reliable], T_world_camera)
+        self._colours.add(voxels[reliable], small[reliable])
+        self._store.save(len(self._keyframes), depth, small, voxels)
+        if self._submap.keyframe_count == settings.keyframes.submap_size:
+            self._submap.save(self._submaps.path(self._submap_index))
+            self._submap, self._submap_index = self._new_submap(), self._submap_index + 1
+        self._submap.integrate(depth, strided, T_world_camera)
+        self._keyframes.append(
+            MappedKeyframe(frame_index, timestamp_s, camera, T_world_camera, self._submap_index)
+        )
+
+    def finish(self) -> SessionGeometry:
+        """What was built."""
+        self._submap.save(self._submaps.path(self._submap_index))
+        surface, remap, first_keyframe = self._fusion.finish(self._settings.surface.min_samples)
+        self._store.remap = remap
+        return SessionGeometry(
+            keyframes=tuple(self._keyframes),
+            surface=surface,
+            first_keyframe=first_keyframe,
+            log_colours=self._colours.finish(remap, len(surface.points_world)),
+            log_gains=np.array(self._colours.log_gains).reshape(-1, 3),
+            submaps=self._submaps,
+            store=self._store,
+            stride=self._settings.image.geometry_stride,
+        )
+
+    def _new_submap(self) -> TsdfSubmap | AccumulatedSubmap:
+        if self._is_lidar:
+            return AccumulatedSubmap(self._voxel_size_m)
+        max_depth_m = self.max_depth_m
+        return TsdfSubmap(TsdfGrid(self._voxel_size_m, self._settings.surface.truncation_voxels, max_depth_m))
 
 
 def _decoded(

@@ -99,16 +99,31 @@ class TsdfSubmap:
 
 
 class SubmapSurfaces:
-    """The finished submaps of a visit, loaded when a view needs them."""
+    """The finished submaps of a visit, loaded when a view needs them.
 
-    def __init__(self, folder: Path, grid: TsdfGrid) -> None:
+    Args:
+        folder: where they were saved.
+        grid: how they were integrated.
+        T_world_saved: (4, 4) from the world of the saved surfaces to the world of the poses of views;
+            None = the same.
+    """
+
+    def __init__(
+        self, folder: Path, grid: TsdfGrid, T_world_saved: NDArray[np.float64] | None = None
+    ) -> None:
         self._folder = folder
         self._grid = grid
+        self._T_world_saved = T_world_saved
         self._loaded: OrderedDict[int, LoadedSubmap] = OrderedDict()
 
     def path(self, submap: int) -> Path:
         """File of a submap."""
         return self._folder / f"submap_{submap:04d}.npz"
+
+    def moved(self, T_new_world: NDArray[np.float64]) -> SubmapSurfaces:
+        """The same submaps in another world frame; nothing is copied, views are turned back instead."""
+        before = np.eye(4) if self._T_world_saved is None else self._T_world_saved
+        return SubmapSurfaces(self._folder, self._grid, T_new_world @ before)
 
     def render_depth(
         self, submaps: tuple[int, ...], camera: PinholeCamera, T_world_camera: NDArray[np.float64]
@@ -118,6 +133,8 @@ class SubmapSurfaces:
         Returns:
             (height, width) float32 metres along z; 0 where no surface is met.
         """
+        if self._T_world_saved is not None:
+            T_world_camera = invert_rigid(self._T_world_saved) @ T_world_camera
         nearest = np.full((camera.height, camera.width), np.inf, np.float32)
         for submap in submaps:
             loaded = self._load(submap)

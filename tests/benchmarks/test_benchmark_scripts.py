@@ -8,8 +8,6 @@ import pytest
 
 from pipeline.camera import is_rigid, rotation_angle_rad
 from pipeline.errors import InputError
-from pipeline.evaluation import GroundTruth, Motion
-from pipeline.ply import LabelledPoints
 
 SCRIPTS = Path(__file__).parents[2] / "benchmarks"
 
@@ -63,24 +61,14 @@ def test_jitter_moves_every_frame_on_its_own(archive: Path, tmp_path: Path) -> N
     np.testing.assert_array_equal(poses(tmp_path / "again"), poses(tmp_path / "wrong"))
 
 
-def test_the_truth_of_the_current_visit_is_carried_along() -> None:
-    from pose_noise import moved_truth
+def test_what_is_left_of_an_offset_is_told_at_the_middle_of_the_path(archive: Path, tmp_path: Path) -> None:
+    from pose_noise import disturb, left_over
 
-    points = LabelledPoints(
-        np.ones((2, 3), np.float32),
-        np.zeros((2, 3), np.uint8),
-        np.array([0, 1], np.uint8),
-        np.ones(2, np.uint8),
-        np.ones(2, np.int32),
-        np.ones(2, np.float32),
-    )
-    shift = np.eye(4)
-    shift[0, 3] = 5
-    moved = moved_truth(GroundTruth(points, {1: Motion(np.eye(4), 3)}), shift)
-    np.testing.assert_array_equal(moved.points.points_world, [[1, 1, 1], [6, 1, 1]])
-    np.testing.assert_array_equal(moved.motions[1].T_world_motion, shift)
-    assert moved.motions[1].symmetry_order == 3
-    np.testing.assert_array_equal(points.points_world, np.ones((2, 3)))
+    T = disturb(archive, tmp_path / "wrong", "offset", 0.02, np.radians(1), np.random.default_rng(0))
+    uncorrected = left_over({"quality": {"registration": {}}}, T, tmp_path / "wrong")
+    assert uncorrected == pytest.approx((20, 1))
+    undone = {"quality": {"registration": {"T_previous_current": np.linalg.inv(T).tolist()}}}
+    assert left_over(undone, T, tmp_path / "wrong") == pytest.approx((0, 0), abs=1e-5)
 
 
 def test_settings_are_named_in_full() -> None:

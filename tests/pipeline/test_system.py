@@ -130,7 +130,7 @@ def test_every_stage_reports_its_progress_to_the_end(finished: Result, events: l
     last = {event.stage: event for event in events}
     names = list(last)
     assert set(names[1:3]) == {"map_previous", "map_current"}  # both visits at once: either may be first
-    assert names[:1] + names[3:] == ["open", "observe", "objects", "compare", "decide", "write"]
+    assert names[:1] + names[3:] == ["open", "register", "observe", "objects", "compare", "decide", "write"]
     for event in last.values():
         assert event.done == event.total > 0, event.stage
     for before, after in pairwise(events):

@@ -243,8 +243,8 @@ def test_progress_marks_stages_before_at_and_after_the_present_one() -> None:
         progress={"open": ProgressEvent("open", 2, 2), "objects": ProgressEvent("objects", 1, 4)}
     )
     html = checked(progress_html(state, ["a", "b"], 65))
-    assert html.count("oa-stage-done") == 4 and html.count("oa-stage-now") == 1
-    assert html.count("oa-stage-later") == len(STAGES) - 5
+    assert html.count("oa-stage-done") == 5 and html.count("oa-stage-now") == 1
+    assert html.count("oa-stage-later") == len(STAGES) - 6
     assert "1 of 4" in html and "1 min 05 s" in html and "width:25%" in html
     assert "data-send" not in progress_html(JobState(error="no disk"), [], 1)
 

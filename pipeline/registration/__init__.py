@@ -1,0 +1,1 @@
+"""Small rigid corrections that lay one mapped surface on another."""
