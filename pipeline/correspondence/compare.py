@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pipeline.association.aggregation import MatchEvidence, PatchShares, patch_owners, patch_shares
 from pipeline.correspondence.covisibility import CovisibilityIndex, PatchView, patch_view, patch_warp
 from pipeline.correspondence.heatmaps import geometric_heatmap, semantic_heatmap
-from pipeline.correspondence.matching import best_nearby, match
+from pipeline.correspondence.matching import best_of_both, match, nearby
 from pipeline.correspondence.place_similarity import PlaceSimilarity
 from pipeline.errors import SceneMismatchError
 from pipeline.mapping.front_end import SessionGeometry
@@ -36,12 +36,17 @@ _PAIRS_AT_ONCE = 16
 
 @dataclass(frozen=True)
 class _PairOutcome:
-    """What comparing one pair of keyframes gave; see ``DenseMatches`` and ``best_nearby``."""
+    """What comparing one pair of keyframes gave; see ``DenseMatches`` and ``Nearby``.
+
+    ``relit0`` and ``relit1`` are those of the heatmaps, after ``FeatureExtractor.relit``.
+    """
 
     links: PatchLinks
     correspondences: tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]
     nearby0: NDArray[np.float32]
     nearby1: NDArray[np.float32]
+    relit0: NDArray[np.float32]
+    relit1: NDArray[np.float32]
     light: NDArray[np.float64]
 
 
@@ -160,12 +165,18 @@ def compare(
         into_previous = patch_warp(view1, view0)
         light = extractor.light(stored0, stored1, into_previous)
         matches = match(*extractor.comparable(stored0, stored1, light))
-        shape0, shape1 = stored0.shape[:2], stored1.shape[:2]
+        shape0 = (stored0.shape[0], stored0.shape[1])
+        shape1 = (stored1.shape[0], stored1.shape[1])
+        nearby0 = nearby(patch_warp(view0, view1), shape1, radius)
+        nearby1 = nearby(into_previous, shape0, radius)
+        relit0, relit1 = best_of_both(*extractor.relit(stored0, stored1, into_previous), nearby0, nearby1)
         return _PairOutcome(
-            links=matches.links((shape0[0], shape0[1]), (shape1[0], shape1[1])),
+            links=matches.links(shape0, shape1),
             correspondences=matches.correspondences(),
-            nearby0=best_nearby(matches.correlation, patch_warp(view0, view1), shape1, radius),
-            nearby1=best_nearby(matches.correlation.T, into_previous, shape0, radius),
+            nearby0=nearby0.best(matches.correlation),
+            nearby1=nearby1.best(matches.correlation.T),
+            relit0=relit0,
+            relit1=relit1,
             light=light,
         )
 
@@ -178,11 +189,12 @@ def compare(
                 p, q, score = outcome.correspondences
                 submap = current.geometry.keyframes[k1].submap
                 evidence[submap].add(owners0[p], owners1[q], score)
-                for visit, (k, nearby, shares) in enumerate(
-                    ((k0, outcome.nearby0, shares0), (k1, outcome.nearby1, shares1))
+                best[0].add(k0, outcome.relit0)
+                best[1].add(k1, outcome.relit1)
+                for visit, (similar, shares) in enumerate(
+                    ((outcome.nearby0, shares0), (outcome.nearby1, shares1))
                 ):
-                    best[visit].add(k, nearby)
-                    similarity[visit][submap].add(shares, nearby.reshape(-1))
+                    similarity[visit][submap].add(shares, similar.reshape(-1))
                 lights.append(outcome.light)
             on_step(begin + len(some), steps)
     covisible = (covisibility.of_previous, covisibility.of_current)

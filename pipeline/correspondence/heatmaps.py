@@ -8,10 +8,32 @@ from numpy.typing import NDArray
 
 from pipeline.perception.protocols import SimilarityScale
 
+# The quietest quarter tells a keyframe's noise: rarely more than three quarters of what it sees is changed,
+# and where it is, the limit keeps the change visible.
+_QUIET_SHARE = 0.25
+_MOST_NOISE = 2.0
+
 
 def change_of_similarity(correlation: NDArray[np.floating], scale: SimilarityScale) -> NDArray[np.float64]:
     """Log odds of a change from a correlation, on the descriptor's own scale; NaN stays NaN."""
     return np.clip((scale.threshold - np.asarray(correlation, np.float64)) / scale.softness, -30, 30)
+
+
+def without_noise(best_correlation: NDArray[np.float32], noise: float) -> NDArray[np.float32]:
+    """Correlations of a keyframe, what they lack of one divided by how noisy the keyframe is.
+
+    Exposure, blur and haze differ from keyframe to keyframe and make all of it look less alike.
+
+    Args:
+        best_correlation: (H_f, W_f), NaN = not co-visible.
+        noise: what is usual, see ``SimilarityScale``; 0 = leave the correlations as they are.
+    """
+    lacking = 1 - best_correlation
+    seen = lacking[np.isfinite(lacking)]
+    if noise <= 0 or not len(seen):
+        return best_correlation
+    factor = np.clip(float(np.quantile(seen, _QUIET_SHARE)) / noise, 1.0, _MOST_NOISE)
+    return (1 - lacking / np.float32(factor)).astype(np.float32)
 
 
 def semantic_heatmap(
@@ -21,7 +43,7 @@ def semantic_heatmap(
 
     Args:
         best_correlation: (H_f, W_f), NaN = not co-visible.
-        scale: how the descriptor's correlation reads; 0.5 lies at its threshold.
+        scale: how the descriptor's correlation reads; 0.5 lies at its threshold in a keyframe of usual noise.
         sigma_patches: Gaussian smoothing over co-visible patches.
 
     Returns:
@@ -29,7 +51,7 @@ def semantic_heatmap(
     """
     visible = np.isfinite(best_correlation)
     weight = visible.astype(np.float32)
-    score = np.where(visible, best_correlation, 0).astype(np.float32)
+    score = np.where(visible, without_noise(best_correlation, scale.noise), 0).astype(np.float32)
     if sigma_patches > 0:
         score = cv2.GaussianBlur(score, (0, 0), sigma_patches)
         weight = cv2.GaussianBlur(weight, (0, 0), sigma_patches)

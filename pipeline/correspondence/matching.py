@@ -72,22 +72,50 @@ def match(features0: NDArray[np.float32], features1: NDArray[np.float32]) -> Den
     )
 
 
-def best_nearby(
-    correlation: NDArray[np.float32], warp: PatchWarp, into_shape: tuple[int, int], radius: int
-) -> NDArray[np.float32]:
-    """Best correlation of each patch among those around its expected place.
+@dataclass(frozen=True)
+class Nearby:
+    """The patches around the expected place of each patch of a keyframe.
 
     The global best match forgives a look-alike anywhere in the image; what stands in the same place has to
     be compared with that place.
 
+    Attributes:
+        shape: (H_f, W_f) of the keyframe.
+        visible: (V,) its patches that the other keyframe sees.
+        around: (V, W) patches of the other keyframe around the place of each.
+        into_count: number of patches of the other keyframe.
+    """
+
+    shape: tuple[int, int]
+    visible: NDArray[np.int64]
+    around: NDArray[np.int64]
+    into_count: int
+
+    def best(self, scores: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(H_f, W_f) best of the scores (N, N_into) around each place; NaN where it is not visible."""
+        return self._drawn(np.take_along_axis(scores[self.visible], self.around, axis=1))
+
+    def _drawn(self, scores: NDArray[np.float32]) -> NDArray[np.float32]:
+        best = np.full(self.shape[0] * self.shape[1], np.nan, np.float32)
+        if len(self.visible):
+            best[self.visible] = scores.max(axis=1)
+        return best.reshape(self.shape)
+
+    def _needed(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which patches of the keyframe and of the other one take part."""
+        own, other = np.zeros(self.shape[0] * self.shape[1], bool), np.zeros(self.into_count, bool)
+        own[self.visible] = True
+        other[self.around.reshape(-1)] = True
+        return own, other
+
+
+def nearby(warp: PatchWarp, into_shape: tuple[int, int], radius: int) -> Nearby:
+    """The windows of a keyframe's patches.
+
     Args:
-        correlation: (N, N_into), rows are the patches of ``warp``.
-        warp: where they lie in the other keyframe.
+        warp: where its patches lie in the other keyframe.
         into_shape: (H_f, W_f) of the other keyframe.
         radius: patches searched in each direction.
-
-    Returns:
-        (H_f, W_f) float32; NaN where the place is not visible.
     """
     rows, columns = into_shape
     height, width = warp.is_visible.shape
@@ -98,8 +126,27 @@ def best_nearby(
     offsets = np.arange(-radius, radius + 1)
     window_row = np.clip(row[:, None, None] + offsets[None, :, None], 0, rows - 1)
     window_column = np.clip(column[:, None, None] + offsets[None, None, :], 0, columns - 1)
-    window = (window_row * columns + window_column).reshape(len(visible), len(offsets) ** 2)
-    best = np.full(height * width, np.nan, np.float32)
-    if len(visible):
-        best[visible] = np.take_along_axis(correlation[visible], window, axis=1).max(axis=1)
-    return best.reshape(height, width)
+    around = (window_row * columns + window_column).reshape(len(visible), len(offsets) ** 2)
+    return Nearby((height, width), visible, around, rows * columns)
+
+
+def best_of_both(
+    features0: NDArray[np.float32], features1: NDArray[np.float32], nearby0: Nearby, nearby1: Nearby
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """``Nearby.best`` of the correlation in both directions, without the parts of it that nobody asks for.
+
+    Args:
+        features0, features1: as in :func:`match`.
+        nearby0: windows of the previous keyframe in the current one. nearby1: the other way round.
+    """
+    (own0, other1), (own1, other0) = nearby0._needed(), nearby1._needed()
+    needed0, needed1 = own0 | other0, own1 | other1
+    # Its number among the needed ones, for every patch.
+    number0, number1 = np.cumsum(needed0) - 1, np.cumsum(needed1) - 1
+    with torch.inference_mode():
+        scores = torch.from_numpy(features0[needed0]) @ torch.from_numpy(features1[needed1]).T
+    flat, columns = scores.numpy().reshape(-1), scores.shape[1]
+    return (
+        nearby0._drawn(flat.take((number0 * columns)[nearby0.visible][:, None] + number1[nearby0.around])),
+        nearby1._drawn(flat.take((number0 * columns)[nearby1.around] + number1[nearby1.visible][:, None])),
+    )

@@ -35,10 +35,14 @@ class SimilarityScale:
     Attributes:
         threshold: correlation at which a place is as likely changed as not.
         softness: how fast that turns; one softness below the threshold is changed at 73 %.
+        noise: what unchanged places lack of a correlation of one, between two visits in like light: a
+            quarter of the patches of a keyframe lack less. Where they lack more, the heatmap takes it for
+            light that could not be taken out; 0 = do not.
     """
 
     threshold: float
     softness: float
+    noise: float = 0.0
 
 
 class FeatureExtractor(Protocol):
@@ -74,6 +78,14 @@ class FeatureExtractor(Protocol):
 
         Returns:
             (N0, d) and (N1, d) float32, patches in row-major order.
+        """
+
+    def relit(
+        self, previous: NDArray[np.float16], current: NDArray[np.float16], warp: PatchWarp
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """F0 and F1 of two whole maps for the heatmap, the difference in light fitted to this pair alone.
+
+        Free to take out more than ``light``; features that do not mind the light return ``comparable``.
         """
 
 

@@ -11,6 +11,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.perception.embedded.colour_transfer import (
+    MIN_SHARED_PATCHES,
+    shared_colours,
+    transferred_colours,
+    warped,
+)
 from pipeline.perception.protocols import PatchWarp, SimilarityScale
 from pipeline.settings import DescriptorSettings
 
@@ -21,9 +27,9 @@ CENTRE_WEIGHT_SPREAD = 1.62
 CONTRAST_FLOOR = 0.02
 COLOUR_CHANNELS = 3
 _GAIN_ROUNDS = 8
-_GAIN_MIN_PATCHES = 60
 _GAIN_FLOOR = 0.05
-_WELL_EXPOSED = (8.0, 245.0)
+# Median colour differences count this much against the kernel width: standard deviations with a margin.
+_SPREAD_OF_MEDIAN = 2.5
 
 
 class GradientColourDescriptor:
@@ -31,7 +37,7 @@ class GradientColourDescriptor:
 
     name = "embedded"
     weights_hash: str | None = None
-    similarity = SimilarityScale(threshold=0.93, softness=0.02)
+    similarity = SimilarityScale(threshold=0.93, softness=0.02, noise=0.02)
 
     def __init__(self, settings: DescriptorSettings) -> None:
         self._settings = settings
@@ -64,17 +70,45 @@ class GradientColourDescriptor:
         gain = np.ones(COLOUR_CHANNELS) if light is None else np.exp(light)
         return self._unit_vectors(previous, np.ones(COLOUR_CHANNELS)), self._unit_vectors(current, gain)
 
+    def relit(
+        self, previous: NDArray[np.float16], current: NDArray[np.float16], warp: PatchWarp
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """F0 and F1 with light, white balance and saturation of the pair taken out.
+
+        A Lab channel in which the pair still differs after that counts less.
+        """
+        colour0, colour1 = (
+            stored[..., :COLOUR_CHANNELS].astype(np.float32) for stored in (previous, current)
+        )
+        lab0 = self._weighted_lab(colour0)
+        lab1 = self._weighted_lab(transferred_colours(colour0, colour1, warp))
+        difference = np.abs(warped(lab0, warp) - lab1)[warp.is_visible]
+        if len(difference):
+            spread = _SPREAD_OF_MEDIAN * np.median(difference, axis=0)
+            certainty = 1 / np.sqrt(1 + (spread / self._settings.colour_sigma_lab) ** 2)
+            lab0, lab1 = lab0 * certainty, lab1 * certainty
+        return self._lifted(lab0, previous), self._lifted(lab1, current)
+
     def _unit_vectors(self, stored: NDArray[np.float16], gain: NDArray[np.float64]) -> NDArray[np.float32]:
-        patches = stored.reshape(-1, stored.shape[-1]).astype(np.float32)
-        colour = np.clip(patches[:, :COLOUR_CHANNELS] * gain.astype(np.float32) / 255.0, 0, 1)
-        lab = cv2.cvtColor(colour[:, None].astype(np.float32), cv2.COLOR_BGR2Lab)[:, 0]
-        weighted = lab * np.array([self._settings.lightness_weight, 1, 1], np.float32)
-        phase = (weighted / np.float32(self._settings.colour_sigma_lab)) @ self._frequencies
+        patches = stored.reshape(-1, 1, stored.shape[-1])
+        colours = patches[..., :COLOUR_CHANNELS].astype(np.float32) * gain.astype(np.float32)
+        return self._lifted(self._weighted_lab(colours), patches)
+
+    def _weighted_lab(self, bgr: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(h, w, 3) Lab of colours in 0..255, lightness by its weight."""
+        lab = cv2.cvtColor(np.clip(bgr / 255.0, 0, 1).astype(np.float32), cv2.COLOR_BGR2Lab)
+        return np.asarray(lab * np.array([self._settings.lightness_weight, 1, 1], np.float32))
+
+    def _lifted(self, weighted_lab: NDArray[np.float32], stored: NDArray[np.float16]) -> NDArray[np.float32]:
+        """(N, 168) of (h, w, 3) colours and the histograms of the stored patches that they belong to."""
+        lab = weighted_lab.reshape(-1, COLOUR_CHANNELS)
+        phase = (lab / np.float32(self._settings.colour_sigma_lab)) @ self._frequencies
         lifted = np.concatenate([np.cos(phase), np.sin(phase)], axis=1)
         lifted /= np.sqrt(np.float32(self._settings.random_features))
         share = np.float32(self._settings.colour_weight)
-        histogram = patches[:, COLOUR_CHANNELS:]
-        return np.concatenate([np.sqrt(share) * lifted, np.sqrt(1 - share) * histogram], axis=1)
+        histogram = stored.reshape(-1, stored.shape[-1])[:, COLOUR_CHANNELS:].astype(np.float32)
+        unit = np.concatenate([np.sqrt(share) * lifted, np.sqrt(1 - share) * histogram], axis=1)
+        return np.asarray(unit, np.float32)
 
 
 def log_gain(
@@ -89,19 +123,8 @@ def log_gain(
         colour0, colour1: (H_f, W_f, 3) mean patch colours, 0..255.
         warp: where the patches of ``colour1`` lie in ``colour0``.
     """
-    expected = cv2.remap(
-        cv2.GaussianBlur(colour0, (0, 0), 0.6),
-        np.ascontiguousarray(warp.positions[..., 0]),
-        np.ascontiguousarray(warp.positions[..., 1]),
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
-    observed = cv2.GaussianBlur(colour1, (0, 0), 0.6)
-    low, high = _WELL_EXPOSED
-    usable = warp.is_visible.copy()
-    for image in (expected, observed):
-        usable &= (image.min(axis=-1) > low) & (image.max(axis=-1) < high)
-    if usable.sum() < _GAIN_MIN_PATCHES:
+    expected, observed, usable = shared_colours(colour0, colour1, warp)
+    if usable.sum() < MIN_SHARED_PATCHES:
         return np.zeros(3)
     difference = np.log(expected[usable]).astype(np.float64) - np.log(observed[usable])
     weights = np.ones(len(difference))

@@ -72,3 +72,27 @@ def test_semantic_smoothing_calms_a_single_bad_patch() -> None:
 
 def test_semantic_of_a_keyframe_that_nobody_shares_is_nan_throughout() -> None:
     assert np.isnan(semantic_heatmap(np.full((3, 4), np.nan, np.float32), SCALE, 1.0)).all()
+
+
+NOISY = SimilarityScale(threshold=0.9, softness=0.02, noise=0.02)
+
+
+def test_semantic_of_a_keyframe_that_is_noisy_throughout_is_calmed_and_its_change_stays() -> None:
+    best = np.full((8, 8), 0.88, np.float32)  # other exposure: unchanged places lack 0.12 instead of 0.02
+    best[2:4, 2:4] = 0.5
+
+    assert semantic_heatmap(best, SCALE, 0.0)[7, 7] > 0.7
+    calmed = semantic_heatmap(best, NOISY, 0.0)
+    assert calmed[7, 7] < 0.3
+    assert calmed[2, 2] > 0.99
+
+
+def test_semantic_of_a_quiet_keyframe_is_left_alone() -> None:
+    best = np.linspace(0.8, 0.999, 64, dtype=np.float32).reshape(8, 8)
+    best[2:] = 0.99
+
+    assert semantic_heatmap(best, NOISY, 0.0) == pytest.approx(semantic_heatmap(best, SCALE, 0.0))
+
+
+def test_semantic_of_a_keyframe_that_changed_throughout_stays_changed() -> None:
+    assert (semantic_heatmap(np.full((6, 6), 0.5, np.float32), NOISY, 0.0) > 0.99).all()

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.correspondence.matching import best_nearby, match
+from pipeline.correspondence.matching import best_of_both, match, nearby
 from pipeline.perception.protocols import PatchWarp
 
 # p0 = e_x, p1 = e_y, p2 in between; q2 equals p2.
@@ -89,9 +89,9 @@ def test_best_nearby_looks_only_around_the_expected_place() -> None:
     correlation = np.array([[0.2, 0.5, 0.3, 0.1, 0.99]], np.float32)
     warp = _warp([[(1.2, 0.0)]], [[True]])
 
-    assert best_nearby(correlation, warp, (1, 5), 0)[0, 0] == pytest.approx(0.5)
-    assert best_nearby(correlation, warp, (1, 5), 1)[0, 0] == pytest.approx(0.5)
-    assert best_nearby(correlation, warp, (1, 5), 3)[0, 0] == pytest.approx(0.99)
+    assert nearby(warp, (1, 5), 0).best(correlation)[0, 0] == pytest.approx(0.5)
+    assert nearby(warp, (1, 5), 1).best(correlation)[0, 0] == pytest.approx(0.5)
+    assert nearby(warp, (1, 5), 3).best(correlation)[0, 0] == pytest.approx(0.99)
 
 
 def test_best_nearby_stays_inside_the_other_image_and_in_two_dimensions() -> None:
@@ -99,17 +99,40 @@ def test_best_nearby_stays_inside_the_other_image_and_in_two_dimensions() -> Non
     correlation = np.array([[0.9, 0.1, 0.2, 0.8, 0.3, 0.4]], np.float32)
     warp = _warp([[(2.0, 1.0)]], [[True]])
 
-    assert best_nearby(correlation, warp, (2, 3), 1)[0, 0] == pytest.approx(0.4)
-    assert best_nearby(correlation, warp, (2, 3), 2)[0, 0] == pytest.approx(0.9)
+    assert nearby(warp, (2, 3), 1).best(correlation)[0, 0] == pytest.approx(0.4)
+    assert nearby(warp, (2, 3), 2).best(correlation)[0, 0] == pytest.approx(0.9)
 
 
 def test_best_nearby_knows_nothing_of_places_that_are_not_visible() -> None:
     correlation = np.ones((2, 2), np.float32)
     warp = _warp([[(0.0, 0.0), (np.nan, np.nan)]], [[True, False]])
 
-    best = best_nearby(correlation, warp, (1, 2), 4)
+    best = nearby(warp, (1, 2), 4).best(correlation)
 
     assert best[0, 0] == 1
     assert np.isnan(best[0, 1])
     hidden = _warp([[(0.0, 0.0), (0.0, 0.0)]], [[False, False]])
-    assert np.isnan(best_nearby(correlation, hidden, (1, 2), 4)).all()
+    assert np.isnan(nearby(hidden, (1, 2), 4).best(correlation)).all()
+
+
+@given(st.integers(0, 1000), st.integers(0, 2))
+def test_best_of_both_is_the_best_of_the_whole_correlation_both_ways(seed: int, radius: int) -> None:
+    rng = np.random.default_rng(seed)
+    shapes = ((3, 5), (4, 3))
+    features0, features1 = (
+        rng.normal(size=(rows * columns, 4)).astype(np.float32) for rows, columns in shapes
+    )
+    windows = [
+        nearby(
+            PatchWarp(rng.uniform(-1, 5, (*own, 2)).astype(np.float32), rng.random(own) < 0.5), other, radius
+        )
+        for own, other in (shapes, shapes[::-1])
+    ]
+
+    best = best_of_both(features0, features1, windows[0], windows[1])
+
+    correlation = match(features0, features1).correlation
+    for found, expected in zip(
+        best, (windows[0].best(correlation), windows[1].best(correlation.T)), strict=True
+    ):
+        assert found == pytest.approx(expected, abs=1e-5, nan_ok=True)

@@ -104,6 +104,56 @@ def test_light_of_images_that_share_nothing_is_zero() -> None:
     assert EXTRACTOR.light(stored, stored, nowhere).tolist() == [0, 0, 0]
 
 
+def other_light(image: np.ndarray) -> np.ndarray:
+    """Less saturated, brighter on the right, another white: what one gain per channel cannot undo."""
+    colours = image.astype(np.float32) / 255
+    grey = colours.mean(axis=-1, keepdims=True)
+    colours = (grey + 0.6 * (colours - grey)) * np.array([0.8, 0.9, 1.0], np.float32)
+    colours *= np.linspace(0.6, 1.2, image.shape[1], dtype=np.float32)[None, :, None]
+    return np.clip(colours * 255, 0, 255).astype(np.uint8)
+
+
+def relit_correlation(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    stored = EXTRACTOR.describe(before), EXTRACTOR.describe(after)
+    f0, f1 = EXTRACTOR.relit(*stored, identity_warp(*stored[0].shape[:2]))
+    assert np.linalg.norm(np.concatenate([f0, f1]), axis=1) == pytest.approx(1, abs=2e-3)
+    return np.asarray((f0 * f1).sum(axis=1).reshape(stored[0].shape[:2]))
+
+
+def test_light_that_differs_over_the_image_is_taken_out_of_one_pair() -> None:
+    before = noise_image(8, (192, 256))
+    after = other_light(before)
+    stored = EXTRACTOR.describe(before), EXTRACTOR.describe(after)
+    light = EXTRACTOR.light(*stored, identity_warp(12, 16))
+
+    one_gain = 1 - np.diag(correlation(before, after, light)).mean()
+    assert 1 - relit_correlation(before, after).mean() < 0.7 * one_gain
+
+
+def test_relighting_a_pair_does_not_explain_away_what_changed() -> None:
+    before = noise_image(9, (192, 256))
+    changed = before.copy()
+    changed[64:112, 96:160] = (200, 40, 30)
+    relit = relit_correlation(before, other_light(changed))
+
+    is_changed = np.zeros((12, 16), bool)
+    is_changed[4:7, 6:10] = True
+    well_inside = np.zeros_like(is_changed)
+    well_inside[5, 7:9] = True
+    apart = cv2.dilate(is_changed.astype(np.uint8), np.ones((5, 5))) == 0
+    assert relit[well_inside].max() < np.quantile(relit[apart], 0.02)
+
+
+def test_relighting_images_that_share_nothing_leaves_them() -> None:
+    stored = EXTRACTOR.describe(noise_image(11))
+    nowhere = PatchWarp(np.full((6, 8, 2), np.nan, np.float32), np.zeros((6, 8), bool))
+
+    for relit, plain in zip(
+        EXTRACTOR.relit(stored, stored, nowhere), EXTRACTOR.comparable(stored, stored, None), strict=True
+    ):
+        assert relit == pytest.approx(plain, abs=1e-6)
+
+
 def test_same_image_gives_the_same_bytes() -> None:
     image = noise_image(7)
     again = GradientColourDescriptor(DescriptorSettings())
