@@ -144,8 +144,9 @@ def best_of_both(
     # Its number among the needed ones, for every patch.
     number0, number1 = np.cumsum(needed0) - 1, np.cumsum(needed1) - 1
     with torch.inference_mode():
-        scores = (torch.from_numpy(features0[needed0]) @ torch.from_numpy(features1[needed1]).T).numpy()
+        scores = torch.from_numpy(features0[needed0]) @ torch.from_numpy(features1[needed1]).T
+    flat, columns = scores.numpy().reshape(-1), scores.shape[1]
     return (
-        nearby0._drawn(scores[number0[nearby0.visible][:, None], number1[nearby0.around]]),
-        nearby1._drawn(scores[number0[nearby1.around], number1[nearby1.visible][:, None]]),
+        nearby0._drawn(flat.take((number0 * columns)[nearby0.visible][:, None] + number1[nearby0.around])),
+        nearby1._drawn(flat.take((number0 * columns)[nearby1.around] + number1[nearby1.visible][:, None])),
     )

@@ -22,7 +22,7 @@ _BLUR_PATCHES = 0.6
 _MIDDLE_LOG = 4.5
 # Pull towards "only a gain" per squared unit: a scene of few colours cannot tell contrast from gain.
 _COLOUR_RIDGE, _PLACE_RIDGE = 0.1, 0.01
-_ROUNDS = 10
+_ROUNDS = 6
 _RESIDUAL_FLOOR = 0.05
 
 

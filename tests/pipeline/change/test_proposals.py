@@ -83,6 +83,7 @@ def test_a_tint_that_is_rare_is_unlike_and_light_that_changed_everywhere_is_not(
     everywhere = np.ones(COUNT, bool)
     row = np.arange(COUNT) % DEPTH
     tinted = (column >= 50) & (column < 55) & (row >= 8) & (row < 13)
+    visit.surface.lab[tinted, 0] = 90  # a sign on the floor, of another colour than around it
     colours = visit.log_colours - np.float32([0.3, 0.3, 0.3])
     colours[tinted] += np.float32([0.5, -0.2, 0.0])
     proposals = propose(visit, seen_by_other(~everywhere, everywhere, colours))
