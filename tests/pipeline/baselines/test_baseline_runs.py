@@ -73,6 +73,7 @@ def test_result_is_as_complete_as_any_other(method: str, result_of: Callable[[st
         carried = set(np.unique(session.object_ids).tolist()) - {0}
         assert carried <= {o.object_id for o in result.objects if o.sighting(session.index) is not None}
         assert np.isfinite(session.semantic_heatmap(3)).any()
+    assert result.moves is None  # no baseline lays objects over each other
     for event in result.replaced:
         assert result.object(event.disappeared_id).label is ChangeLabel.DISAPPEARED
         assert result.object(event.appeared_id).label is ChangeLabel.APPEARED
