@@ -272,25 +272,25 @@ class MoveSettings:
     min_rotation_deg: float = setting(
         10.0, "an object turned on the spot by more than this moved", unit="deg"
     )
-    min_log_odds: float = setting(-1.3, "log odds from which two objects are one that moved")
+    min_log_odds: float = setting(-0.8, "log odds from which two objects are one that moved")
     # Weights of association.moves, from benchmarks/fit_move_score.py on scenes that no table reports.
-    bias: float = setting(-4.43, "log odds that two objects are one before any evidence")
+    bias: float = setting(-4.82, "log odds that two objects are one before any evidence")
     overlap_more_weight: float = setting(
-        0.63, "log odds for the larger share of visible surface that is shared"
+        0.74, "log odds for the larger share of visible surface that is shared"
     )
-    overlap_less_weight: float = setting(-1.28, "log odds for the smaller share of visible surface shared")
-    shared_weight: float = setting(2.33, "log odds for the share of the smaller cloud that is shared")
-    likelihood_weight: float = setting(0.48, "log odds per log likelihood ratio of the colours")
-    likelihood_shared_weight: float = setting(-1.06, "the same, where much of the surface is shared")
+    overlap_less_weight: float = setting(-1.04, "log odds for the smaller share of visible surface shared")
+    shared_weight: float = setting(5.24, "log odds for the share of the smaller cloud that is shared")
+    likelihood_weight: float = setting(0.21, "log odds per log likelihood ratio of the colours")
+    likelihood_shared_weight: float = setting(0.49, "the same, where much of the surface is shared")
     texture_correlation_weight: float = setting(1.66, "log odds per Fisher-transformed texture correlation")
-    texture_weight: float = setting(0.95, "log odds for a textured surface")
-    gain_weight: float = setting(-2.8, "log odds per log unit of brightness gain")
-    reach_ratio_weight: float = setting(0.39, "log odds per log ratio of the level reaches")
-    height_ratio_weight: float = setting(-0.64, "log odds per log ratio of the heights")
-    vacated_weight: float = setting(2.13, "log odds for the share of both places seen to be empty")
-    voxels_weight: float = setting(-0.23, "log odds per log voxel of the smaller object")
-    chroma_rank_weight: float = setting(-0.71, "log odds per log share of pairs of colours as like")
-    agreement_rank_weight: float = setting(-0.48, "log odds per log share of pairs that agree as well")
+    texture_weight: float = setting(0.35, "log odds for a textured surface")
+    gain_weight: float = setting(-3.01, "log odds per log unit of brightness gain")
+    reach_ratio_weight: float = setting(-0.34, "log odds per log ratio of the level reaches")
+    height_ratio_weight: float = setting(-1.02, "log odds per log ratio of the heights")
+    vacated_weight: float = setting(2.12, "log odds for the share of both places seen to be empty")
+    voxels_weight: float = setting(-0.24, "log odds per log voxel of the smaller object")
+    chroma_rank_weight: float = setting(-0.55, "log odds per log share of pairs of colours as like")
+    agreement_rank_weight: float = setting(0.11, "log odds per log share of pairs that agree as well")
 
 
 @dataclass(frozen=True)
@@ -325,21 +325,21 @@ class ChangeSettings:
 class ConfidenceSettings:
     """How likely labels are right; from benchmarks/fit_confidence.py on scenes that no table reports."""
 
-    static_bias: float = setting(0.0, "static: log odds that such a label is right, before any evidence")
-    static_change: float = setting(0.5, "static: log odds per log odds of the change")
-    static_coverage: float = setting(0.0, "static: log odds for full coverage")
-    static_voxels: float = setting(0.0, "static: log odds per tenfold number of voxels")
-    static_move: float = setting(0.0, "static: log odds per log odds of the likeliest move")
-    changed_bias: float = setting(0.0, "changed: log odds that such a label is right, before any evidence")
-    changed_change: float = setting(0.5, "changed: log odds per log odds of the change")
-    changed_coverage: float = setting(0.0, "changed: log odds for full coverage")
-    changed_voxels: float = setting(0.0, "changed: log odds per tenfold number of voxels")
-    changed_move: float = setting(0.0, "changed: log odds per log odds of the likeliest move")
-    moved_bias: float = setting(0.0, "moved: log odds that such a label is right, before any evidence")
-    moved_change: float = setting(0.0, "moved: log odds per log odds of the change")
-    moved_coverage: float = setting(0.0, "moved: log odds for full coverage")
-    moved_voxels: float = setting(0.0, "moved: log odds per tenfold number of voxels")
-    moved_move: float = setting(0.5, "moved: log odds per log odds of the likeliest move")
+    static_bias: float = setting(-3.18, "static: log odds that such a label is right, before any evidence")
+    static_change: float = setting(1.22, "static: log odds per log odds of the change")
+    static_coverage: float = setting(1.02, "static: log odds for full coverage")
+    static_voxels: float = setting(1.57, "static: log odds per tenfold number of voxels")
+    static_move: float = setting(0.49, "static: log odds per log odds of the likeliest move")
+    changed_bias: float = setting(-1.82, "changed: log odds that such a label is right, before any evidence")
+    changed_change: float = setting(0.15, "changed: log odds per log odds of the change")
+    changed_coverage: float = setting(-0.12, "changed: log odds for full coverage")
+    changed_voxels: float = setting(0.37, "changed: log odds per tenfold number of voxels")
+    changed_move: float = setting(-0.30, "changed: log odds per log odds of the likeliest move")
+    moved_bias: float = setting(-0.72, "moved: log odds that such a label is right, before any evidence")
+    moved_change: float = setting(0.19, "moved: log odds per log odds of the change")
+    moved_coverage: float = setting(0.77, "moved: log odds for full coverage")
+    moved_voxels: float = setting(-0.04, "moved: log odds per tenfold number of voxels")
+    moved_move: float = setting(0.29, "moved: log odds per log odds of the likeliest move")
 
 
 @dataclass(frozen=True)
