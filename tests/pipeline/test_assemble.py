@@ -23,7 +23,8 @@ def decision(labels0: list[int], labels1: list[int], identities: list[tuple[int,
     """Labels of the instances (background is added in front)."""
     full0, full1 = np.array([L.STATIC, *labels0]), np.array([L.STATIC, *labels1])
     tied = tuple(Identity(previous, current, 1.0) for previous, current in identities)
-    return Decision(tied, full0, full1, np.ones(len(full0)), np.ones(len(full1)))
+    odds = (np.zeros(len(full0)), np.zeros(len(full1)))
+    return Decision(tied, full0, full1, np.ones(len(full0)), np.ones(len(full1)), odds, odds)
 
 
 def test_previous_objects_keep_their_number_and_new_ones_follow() -> None:
@@ -98,7 +99,13 @@ def one_object(
 ) -> MapObject:
     """The first object of a previous visit of one and a current visit of two, seen in both as instance 2."""
     final = Decision(
-        (Identity(1, 2, 0.8, T),), np.array([1, L.MOVED]), np.array([1, 2, L.MOVED]), np.ones(2), np.ones(3)
+        (Identity(1, 2, 0.8, T),),
+        np.array([1, L.MOVED]),
+        np.array([1, 2, L.MOVED]),
+        np.ones(2),
+        np.ones(3),
+        (np.zeros(2), np.zeros(3)),
+        (np.zeros(2), np.zeros(3)),
     )
     settings = Settings()
     association = AccumulatedAssociation(1, 2, settings.association)

@@ -11,6 +11,8 @@ from pipeline.association.accumulation import AccumulatedAssociation
 from pipeline.association.aggregation import MatchEvidence
 from pipeline.association.moves import FEATURES, ScoredMove
 from pipeline.association.registration import Registration
+from pipeline.change.confidence import NO_MOVE_LOG_ODDS, confidence_features, label_confidence
+from pipeline.change.decide import _Moves
 from pipeline.change.decision import (
     NOT_MET,
     Decision,
@@ -139,6 +141,10 @@ def move(previous: int, current: int, log_odds: float = 2.0, x_m: float = 2.0) -
     return ScoredMove(previous, current, registration, np.zeros(len(FEATURES)), log_odds)
 
 
+def no_moves(before, now) -> tuple[np.ndarray, np.ndarray]:
+    return np.full(before.count + 1, NO_MOVE_LOG_ODDS), np.full(now.count + 1, NO_MOVE_LOG_ODDS)
+
+
 def by_evidence(before, now, overlap=None, moves=()) -> Decision:
     overlap = np.zeros((before.count, now.count)) if overlap is None else np.array(overlap, float)
     return decide_by_evidence(
@@ -146,6 +152,7 @@ def by_evidence(before, now, overlap=None, moves=()) -> Decision:
         now,
         overlap,
         lambda left, taken: [m for m in moves if m.previous in left and m.current in taken],
+        no_moves(before, now),
         SETTINGS,
     )
 
@@ -171,7 +178,7 @@ def test_evidence_rule_by_hand() -> None:
         assert ((confidence >= 0) & (confidence <= 1)).all()
 
 
-def test_move_gives_identity_motion_and_the_probability_of_its_log_odds() -> None:
+def test_move_gives_identity_and_motion() -> None:
     before = visit([0.0], seen_through=0.9, changed=True)
     now = visit([2.0], seen_through=0.9, changed=True)
 
@@ -180,7 +187,22 @@ def test_move_gives_identity_motion_and_the_probability_of_its_log_odds() -> Non
     (identity,) = decision.identities
     assert (identity.previous, identity.current) == (1, 1)
     assert identity.T_world_motion[:3, 3].tolist() == [2.0, 0, 0]
-    assert decision.confidence0[1] == decision.confidence1[1] == pytest.approx(1 / (1 + np.exp(-1.5)))
+    features = confidence_features(np.array([5.0]), np.ones(1), np.array([100]), np.array([1.5]))
+    (expected,) = label_confidence(np.array([L.MOVED]), features, SETTINGS.confidence)
+    assert decision.confidence0[1] == decision.confidence1[1] == pytest.approx(expected)
+    assert decision.move_log_odds[0][1] == decision.move_log_odds[1][1] == 1.5
+
+
+def test_what_two_visits_say_of_one_place_is_averaged() -> None:
+    # 5 and -5 of objects of one size: neither side is believed alone, and 0 is no change.
+    before, now = visit([0.0], changed=True), visit([0.0])
+
+    apart = by_evidence(before, now, [[0.4]])
+    together = by_evidence(before, now, [[0.6]])
+
+    assert (apart.labels0[1], apart.labels1[1]) == (L.DISAPPEARED, L.STATIC)
+    assert together.log_odds[0][1] == together.log_odds[1][1] == pytest.approx(0.0)
+    assert (together.labels0[1], together.labels1[1]) == (L.STATIC, L.STATIC)
 
 
 def moved_if_possible(before: VisitEvidence, now: VisitEvidence) -> bool:
@@ -200,16 +222,25 @@ def test_doubtful_change_may_move_and_a_sure_stay_may_not() -> None:
     assert not moved_if_possible(visit([0.0], log_odds=[least]), visit([2.0], changed=True))
 
 
-@pytest.mark.parametrize("fields", [{"coverage": 0.49}, {"is_met": False}])
-def test_what_was_hardly_observed_or_not_met_did_not_move(fields: dict) -> None:
-    assert not moved_if_possible(visit([0.0], changed=True), visit([2.0], changed=True, **fields))
+def test_what_was_not_met_did_not_move() -> None:
+    assert not moved_if_possible(visit([0.0], changed=True), visit([2.0], changed=True, is_met=False))
+
+
+@pytest.mark.parametrize(
+    ("left", "taken", "is_observed"), [(0.49, 0.49, False), (0.5, 0, True), (0, 1, True)]
+)
+def test_one_of_the_two_places_of_a_move_was_observed(left: float, taken: float, is_observed: bool) -> None:
+    moves = _Moves.__new__(_Moves)
+    moves._coverage, moves._settings = (np.array([1, left]), np.array([1, taken])), SETTINGS
+
+    assert moves._is_observed(move(1, 1)) is is_observed
 
 
 def test_object_that_moved_is_not_tied_to_what_stands_at_its_place() -> None:
     # Both were doubtful; before moves were looked for, the two first objects shared a place.
     before, now = visit([0.0], log_odds=[-0.5]), visit([0.0, 2.0], log_odds=[-5.0, -0.5])
 
-    decision = by_evidence(before, now, [[0.8, 0.0]], moves=[move(1, 2)])
+    decision = by_evidence(before, now, [[0.4, 0.0]], moves=[move(1, 2)])
 
     assert [(i.previous, i.current) for i in decision.identities] == [(1, 2)]
     assert decision.labels1.tolist() == [L.STATIC, L.STATIC, L.MOVED]
@@ -247,6 +278,7 @@ def test_background_is_no_object_whatever_its_evidence(background: tuple[float, 
         now,
         np.diag([0.8, 0.8]),
         lambda left, taken: asked.append((left, taken)) or [],
+        no_moves(before, now),
         SETTINGS,
     )
 

@@ -173,7 +173,7 @@ def test_pattern_spread_never_widens() -> None:
 def test_the_stored_table_gives_the_same_log_odds_again() -> None:
     evidence = with_object(texture_correlation=0.1, tail_share=0.4, median_residual=0.5, dissimilarity=-0.5)
     odds = change_log_odds(evidence, AGREEING, SETTINGS)
-    table = evidence.table(odds)
+    table = evidence.table(log_odds=odds)
 
     assert change_log_odds(ObjectEvidence.from_table(table), AGREEING, SETTINGS)[1:] == pytest.approx(
         odds[1:], abs=1e-4
