@@ -229,11 +229,11 @@ def test_what_was_not_met_did_not_move() -> None:
 @pytest.mark.parametrize(
     ("left", "taken", "is_observed"), [(0.49, 0.49, False), (0.5, 0, True), (0, 1, True)]
 )
-def test_one_of_the_two_places_of_a_move_was_observed(left: float, taken: float, is_observed: bool) -> None:
+def test_one_of_the_two_places_of_a_move_was_observed(left: float, taken: float, seen: bool) -> None:
     moves = _Moves.__new__(_Moves)
     moves._coverage, moves._settings = (np.array([1, left]), np.array([1, taken])), SETTINGS
 
-    assert moves._is_observed(move(1, 1)) is is_observed
+    assert moves._is_observed(move(1, 1)) is seen
 
 
 def test_object_that_moved_is_not_tied_to_what_stands_at_its_place() -> None:
