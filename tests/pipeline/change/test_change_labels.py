@@ -226,9 +226,7 @@ def test_what_was_not_met_did_not_move() -> None:
     assert not moved_if_possible(visit([0.0], changed=True), visit([2.0], changed=True, is_met=False))
 
 
-@pytest.mark.parametrize(
-    ("left", "taken", "is_observed"), [(0.49, 0.49, False), (0.5, 0, True), (0, 1, True)]
-)
+@pytest.mark.parametrize(("left", "taken", "seen"), [(0.49, 0.49, False), (0.5, 0, True), (0, 1, True)])
 def test_one_of_the_two_places_of_a_move_was_observed(left: float, taken: float, seen: bool) -> None:
     moves = _Moves.__new__(_Moves)
     moves._coverage, moves._settings = (np.array([1, left]), np.array([1, taken])), SETTINGS
