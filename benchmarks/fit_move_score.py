@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
+from pipeline.association.cloud_agreement import Registration
 from pipeline.association.moves import FEATURES, ScoredMove, choose_moves
-from pipeline.association.registration import Registration
 from pipeline.errors import InputError, ResultError
 from pipeline.ply import LabelledPoints, read_ply
 from pipeline.result import ChangeLabel, SessionResult

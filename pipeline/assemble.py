@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.association.registration import rotation_angle
+from pipeline.camera import rotation_angle_rad
 from pipeline.change.change_score import appearance_change
 from pipeline.change.decide import Conclusion
 from pipeline.change.decision import NOT_MET, Decision, VisitEvidence
@@ -185,7 +185,7 @@ def _object(
         s_bar=_rounded(s_bar),
         coverage=min(seen.coverage for seen in sightings),
         displacement_m=displacement,
-        rotation_rad=None if motion is None else _rounded(rotation_angle(motion[:3, :3])),
+        rotation_rad=None if motion is None else _rounded(rotation_angle_rad(np.eye(3), motion[:3, :3])),
         seen_through=_rounded(visits[axis].objects.seen_through[instance]),
         appearance_change=None if np.isnan(appearance) else _rounded(appearance),
         decided_in_submap=settled.get(object_id),

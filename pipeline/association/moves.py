@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from pipeline.association.registration import ObjectCloud, Registration, register
+from pipeline.association.cloud_agreement import ObjectCloud, Registration
+from pipeline.association.registration import register
 from pipeline.settings import MoveSettings
 
 _THREADS = 2

@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.association.registration import ObjectCloud
+from pipeline.association.cloud_agreement import ObjectCloud
 from pipeline.camera import transform_points
 from pipeline.mapping.colours import log_colour
 from pipeline.mapping.front_end import SessionGeometry

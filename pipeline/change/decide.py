@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.association.accumulation import AccumulatedAssociation
 from pipeline.association.moves import Candidate, ScoredMove, choose_moves, score_moves
 from pipeline.association.object_clouds import ObjectClouds
-from pipeline.association.registration import rotation_angle
+from pipeline.camera import rotation_angle_rad
 from pipeline.change.appearance import AppearanceResidual, appearance_residual
 from pipeline.change.change_score import change_log_odds
 from pipeline.change.colocation import nearest_instances, overlap_matrix
@@ -228,5 +228,5 @@ class _Moves:
         T = move.registration.T_world_motion
         centroid = self._centroids[move.previous]
         shift_m = float(np.linalg.norm(T[:3, :3] @ centroid + T[:3, 3] - centroid))
-        turn_deg = float(np.degrees(rotation_angle(T[:3, :3])))
+        turn_deg = float(np.degrees(rotation_angle_rad(np.eye(3), T[:3, :3])))
         return shift_m > self._settings.change.tau_d_m or turn_deg > self._settings.moves.min_rotation_deg

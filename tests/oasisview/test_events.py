@@ -4,6 +4,8 @@ import asyncio
 import json
 import threading
 import time
+from collections.abc import Coroutine
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -31,6 +33,12 @@ ANY_JSON = st.recursive(
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=6), inner, max_size=4),
     max_leaves=8,
 )
+
+
+def run_apart(work: Coroutine[Any, Any, None]) -> None:
+    """On a thread of its own: in this one, a browser of other tests may have an event loop running."""
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(asyncio.run, work).result()
 
 
 @given(ANY_JSON)
@@ -98,7 +106,7 @@ async def settled(queue: EventQueue) -> None:
 
 def test_sync_and_async_handlers_keep_the_order() -> None:
     handled: list[Any] = []
-    main = threading.get_ident()
+    main: list[int] = []
     threads: set[int] = set()
 
     def slow_when_odd(value: int) -> None:
@@ -108,10 +116,11 @@ def test_sync_and_async_handlers_keep_the_order() -> None:
 
     async def later(value: int) -> None:
         await asyncio.sleep(0.005)
-        assert threading.get_ident() == main
+        assert threading.get_ident() == main[0]
         handled.append(value)
 
     async def run() -> None:
+        main.append(threading.get_ident())
         queue = EventQueue(report=pytest.fail)
         queue.register("sync", slow_when_odd, events.whole_number(0, 99), latest_only=False)
         queue.register("async", later, events.whole_number(0, 99), latest_only=False)
@@ -119,9 +128,9 @@ def test_sync_and_async_handlers_keep_the_order() -> None:
             queue.receive(message("sync" if value % 3 else "async", value))
         await settled(queue)
 
-    asyncio.run(run())
+    run_apart(run())
     assert handled == list(range(12))
-    assert main not in threads
+    assert main[0] not in threads
 
 
 def test_latest_only_skips_to_the_newest() -> None:
@@ -134,7 +143,7 @@ def test_latest_only_skips_to_the_newest() -> None:
             queue.receive(message("scrub", value))
         await settled(queue)
 
-    asyncio.run(run())
+    run_apart(run())
     assert handled == [49]
 
 
@@ -168,7 +177,7 @@ def test_what_is_wrong_is_dropped(caplog: pytest.LogCaptureFixture) -> None:
         queue.receive(message("text", "too late"))
         await settled(queue)
 
-    asyncio.run(run())
+    run_apart(run())
     assert handled == ["right"]
 
 
@@ -182,5 +191,5 @@ def test_a_flood_is_cut_off() -> None:
             queue.receive(message("pick", value))
         await settled(queue)
 
-    asyncio.run(run())
+    run_apart(run())
     assert handled == list(range(1, MAX_WAITING + 1))

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.association import moves as module
+from pipeline.association.cloud_agreement import ObjectCloud, Registration
 from pipeline.association.moves import (
     FEATURES,
     Candidate,
@@ -19,7 +20,6 @@ from pipeline.association.moves import (
     score_moves,
     size_m,
 )
-from pipeline.association.registration import ObjectCloud, Registration
 from pipeline.settings import MoveSettings
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -8,14 +8,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 
-from pipeline.association.registration import (
-    ObjectCloud,
-    Registration,
-    register,
-    rotation_about,
-    rotation_angle,
-)
-from pipeline.camera import is_rigid
+from pipeline.association.cloud_agreement import ObjectCloud, Registration
+from pipeline.association.registration import register, rotation_about
+from pipeline.camera import is_rigid, rotation_angle_rad
 
 UP = np.array([0.0, 0.0, 1.0])
 SPACING_M = 0.02
@@ -89,7 +84,7 @@ def error(found: Registration, yaw_rad: float, shift_m: np.ndarray) -> tuple[flo
     middle = np.array([0, 0, SIZE_M[2] / 2])
     T = found.T_world_motion
     return (
-        float(np.degrees(rotation_angle(R.T @ T[:3, :3]))),
+        float(np.degrees(rotation_angle_rad(np.eye(3), R.T @ T[:3, :3]))),
         float(np.linalg.norm(T[:3, :3] @ middle + T[:3, 3] - (R @ middle + shift_m))),
     )
 
@@ -213,6 +208,6 @@ def test_rotation_about_an_axis_turns_by_its_angle_and_leaves_the_axis(angle: fl
     unit = np.array(axis) / np.linalg.norm(axis)
     R = rotation_about(unit, angle)
 
-    assert rotation_angle(R) == pytest.approx(abs(angle), abs=1e-6)
+    assert rotation_angle_rad(np.eye(3), R) == pytest.approx(abs(angle), abs=1e-6)
     assert R @ unit == pytest.approx(unit)
     assert np.linalg.det(R) == pytest.approx(1)

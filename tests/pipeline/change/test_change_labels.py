@@ -9,8 +9,8 @@ import pytest
 
 from pipeline.association.accumulation import AccumulatedAssociation
 from pipeline.association.aggregation import MatchEvidence
+from pipeline.association.cloud_agreement import Registration
 from pipeline.association.moves import FEATURES, ScoredMove
-from pipeline.association.registration import Registration
 from pipeline.change.confidence import NO_MOVE_LOG_ODDS, confidence_features, label_confidence
 from pipeline.change.decide import _Moves
 from pipeline.change.decision import (
