@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from instance_truth import instance_truths
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from pipeline.change.change_score import appearance_trust, change_features
 from pipeline.change.evidence import ObjectEvidence
@@ -25,7 +25,6 @@ from pipeline.settings import ChangeSettings
 from pipeline.store import open_result
 
 NAMES = ("bias", "seen_through", "dissimilarity", "residual", "texture", "tail", "pattern")
-MATCH_RADIUS_M = 0.15
 MIN_COVERAGE = 0.3
 RIDGE = 0.02
 NEWTON_STEPS = 60
@@ -61,26 +60,19 @@ def read_examples(folder: Path) -> Examples:
     """The objects of a result whose truth is clear."""
     result, truth = open_result(folder / "changes.oasis"), read_ply(folder / "gt.ply")
     trust = appearance_trust(result.manifest["quality"]["appearance_scale_log"], ChangeSettings())
+    evidence = [ObjectEvidence.from_table(session.evidence) for session in result.sessions]  # type: ignore[attr-defined]
+    # Colours and patches count as far as the visits' colours agree, geometry and patterns always.
+    values = [change_features(of_visit) * np.array([1.0, *[trust] * 4, 1.0]) for of_visit in evidence]
     features, changed, weight = [], [], []
-    for number, session in enumerate(result.sessions):
-        evidence = ObjectEvidence.from_table(session.evidence)  # type: ignore[attr-defined]
-        # Colours and patches count as far as the visits' colours agree, geometry and patterns always.
-        values = change_features(evidence) * np.array([1.0, *[trust] * 4, 1.0])
-        mine = truth.session == number
-        distance, nearest = cKDTree(truth.points_world[mine]).query(
-            np.asarray(session.points_world), distance_upper_bound=MATCH_RADIUS_M
-        )
-        near, ids = np.isfinite(distance), np.asarray(session.object_ids)
-        scores = result.score_matrix
-        for instance, object_id in enumerate((scores.row_object_ids, scores.column_object_ids)[number]):
-            labels = truth.label[mine][nearest[near & (ids == object_id)]]
-            counts = np.bincount(labels, minlength=256)[: ChangeLabel.MOVED + 1]
-            share = counts[ChangeLabel.APPEARED :].sum() / max(1, counts.sum())
-            if counts.sum() < 5 or 0.2 < share < 0.8 or evidence.coverage[instance + 1] < MIN_COVERAGE:
-                continue
-            features.append([1.0, *values[instance + 1]])
-            changed.append(share > 0.5)
-            weight.append(np.sqrt(min(int(counts.sum()), MAX_WEIGHT_POINTS)) / 20)
+    for found in instance_truths(result, truth):
+        counts = np.bincount(found.labels, minlength=256)[: ChangeLabel.MOVED + 1]
+        share = counts[ChangeLabel.APPEARED :].sum() / max(1, counts.sum())
+        coverage = evidence[found.session].coverage[found.instance + 1]
+        if counts.sum() < 5 or 0.2 < share < 0.8 or coverage < MIN_COVERAGE:
+            continue
+        features.append([1.0, *values[found.session][found.instance + 1]])
+        changed.append(share > 0.5)
+        weight.append(np.sqrt(min(int(counts.sum()), MAX_WEIGHT_POINTS)) / 20)
     return Examples(np.array(features), np.array(changed), np.array(weight))
 
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from instance_truth import instance_truths
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.spatial import cKDTree
 
 from pipeline.change.confidence import FEATURES, GROUPS, confidence_features, group_of
 from pipeline.evaluation.calibration import calibration_scores
@@ -25,7 +25,6 @@ from pipeline.ply import NOT_SCORED, read_ply
 from pipeline.result import ChangeLabel
 from pipeline.store import open_result
 
-MATCH_RADIUS_M = 0.15
 MIN_POINTS = 5
 RIDGE = 1.0
 
@@ -60,27 +59,22 @@ def read_examples(folder: Path) -> Examples:
     """The decided instances of a result that the ground truth speaks about."""
     result, truth = open_result(folder / "changes.oasis"), read_ply(folder / "gt.ply")
     label_of = {item.object_id: int(item.label) for item in result.objects}
-    features, labels, is_right = [], [], []
-    for number, session in enumerate(result.sessions):
-        rows = session.evidence  # type: ignore[attr-defined]
-        values = confidence_features(
+    tables = [session.evidence for session in result.sessions]  # type: ignore[attr-defined]
+    values = [
+        confidence_features(
             rows["log_odds"], rows["coverage"], rows["voxel_count"].astype(int), rows["move_log_odds"]
         )
-        mine = truth.session == number
-        distance, nearest = cKDTree(truth.points_world[mine]).query(
-            np.asarray(session.points_world), distance_upper_bound=MATCH_RADIUS_M
-        )
-        near, ids = np.isfinite(distance), np.asarray(session.object_ids)
-        scores = result.score_matrix
-        for instance, object_id in enumerate((scores.row_object_ids, scores.column_object_ids)[number]):
-            true = truth.label[mine][nearest[near & (ids == object_id)]]
-            true = true[(true != NOT_SCORED) & (true != ChangeLabel.UNKNOWN)]
-            label = label_of[int(object_id)]
-            if len(true) < MIN_POINTS or label == ChangeLabel.UNKNOWN:
-                continue
-            features.append(values[instance])
-            labels.append(label)
-            is_right.append(int(np.bincount(true).argmax()) == label)
+        for rows in tables
+    ]
+    features, labels, is_right = [], [], []
+    for found in instance_truths(result, truth):
+        true = found.labels[(found.labels != NOT_SCORED) & (found.labels != ChangeLabel.UNKNOWN)]
+        label = label_of[found.object_id]
+        if len(true) < MIN_POINTS or label == ChangeLabel.UNKNOWN:
+            continue
+        features.append(values[found.session][found.instance])
+        labels.append(label)
+        is_right.append(int(np.bincount(true).argmax()) == label)
     return Examples(np.array(features), group_of(np.array(labels)), np.array(is_right))
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
-from pipeline.association.cloud_agreement import Registration
+from pipeline.association.cloud_agreement import ObjectRegistration
 from pipeline.association.moves import FEATURES, ScoredMove, choose_moves
 from pipeline.errors import InputError, ResultError
 from pipeline.ply import LabelledPoints, read_ply
@@ -163,7 +163,7 @@ def fit(examples: list[Examples]) -> NDArray[np.float64]:
 def report(examples: list[Examples], weights: NDArray[np.float64]) -> str:
     """Moves that the engine would claim with these weights, whether anything went far enough or not."""
     claimed = right = found = present = 0
-    nowhere = Registration(np.eye(4), *[0.0] * 9)
+    nowhere = ObjectRegistration(np.eye(4), *[0.0] * 9)
     for e in examples:
         log_odds = weights[0] + e.features @ weights[1:]
         scored = [

@@ -98,7 +98,7 @@ class RegistrationSettings:
     )
     max_translation_m: float = setting(0.3, "a larger correction is no pose error and is not made", unit="m")
     max_rotation_deg: float = setting(5.0, "a larger correction is no pose error and is not made", unit="deg")
-    # Off: poses get better, but no change score was seen to (benchmarks/pose_noise.py, jitter).
+    # Off: tried on two pairs (benchmarks/pose_noise.py, jitter), of which one gained change F1.
     keyframes: bool = setting(False, "correct single keyframes too, where most of them need it")
     keyframe_samples: int = setting(1000, "pixels of a keyframe that take part", least=100)
     keyframe_translation_m: float = setting(0.02, "expected error of a keyframe's pose", unit="m")

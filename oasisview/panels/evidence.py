@@ -94,7 +94,7 @@ def _numbers(item: MapObject, limits: Limits) -> str:
     return (
         section("Evidence", CASE_WORDS[item.case])
         + "".join(rows)
-        + '<div class="oa-note">The blue tick is the limit that decides.</div>'
+        + '<div class="oa-note">The blue tick is each measure&#39;s limit; the sentence above says what decided.</div>'
     )
 
 

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pipeline.mapping.colours import within_faces
+
 # Points nearer than this many spacings are one surface.
 _SAME_SURFACE_SPACINGS = 2.0
 _SAME_FACING = 0.3
@@ -22,7 +24,7 @@ _IN_VIEW_COSINE = 0.35
 _SAME_RESIDUAL = 0.3
 _LIKELIHOOD_LIMIT = 2.0
 # Of an object so much must be shared for its colours to count in full.
-_ENOUGH_SHARED = 0.3
+ENOUGH_SHARED = 0.3
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ class ObjectCloud:
 
 
 @dataclass(frozen=True)
-class Registration:
+class ObjectRegistration:
     """The best rigid motion that was found between two clouds, and how well they agree under it.
 
     Attributes:
@@ -91,7 +93,7 @@ class Registration:
     @property
     def agreement(self) -> float:
         """Orders registrations of the same clouds: nothing in view is missing, the pattern is the same."""
-        return 2 * (self.overlap - 1) + (0.5 + self.likelihood) * min(1.0, self.shared / _ENOUGH_SHARED)
+        return 2 * (self.overlap - 1) + (0.5 + self.likelihood) * min(1.0, self.shared / ENOUGH_SHARED)
 
 
 def agreement_under(
@@ -101,7 +103,7 @@ def agreement_under(
     rotation: NDArray[np.float64],
     translation: NDArray[np.float64],
     spacing_m: float,
-) -> Registration:
+) -> ObjectRegistration:
     """How well two clouds agree under a motion; ``tree`` holds the points of the current one."""
     moved = np.asarray(previous.points_world, np.float64) @ rotation.T + translation
     turned = np.asarray(previous.normals_world, np.float64) @ rotation.T
@@ -121,17 +123,16 @@ def agreement_under(
     overlap = (_share(shared, in_view | shared), _share(found, in_view_back | found))
     part = max(float(shared.mean()), float(found.mean()))
     if int(shared.sum()) < MIN_SHARED_POINTS:
-        return Registration(T, *overlap, part, -1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+        return ObjectRegistration(T, *overlap, part, -1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
     own = np.asarray(previous.log_colours, np.float64)[shared]
     other = np.asarray(current.log_colours, np.float64)[nearest[shared]]
     grey0, grey1 = own.mean(axis=1), other.mean(axis=1)
     gain = float(np.median(grey1 - grey0))
     residual = np.linalg.norm(other - own - gain, axis=1)
     chroma = np.linalg.norm((other - grey1[:, None]) - (own - grey0[:, None]), axis=1)
-    face = _faces(turned[shared])
-    grey0, grey1 = _within(grey0, face), _within(grey1, face)
+    grey0, grey1 = within_faces(grey0, turned[shared]), within_faces(grey1, turned[shared])
     correlation = float(grey0 @ grey1 / np.sqrt((grey0 @ grey0) * (grey1 @ grey1) + 1e-9))
-    return Registration(
+    return ObjectRegistration(
         T,
         *overlap,
         part,
@@ -165,15 +166,3 @@ def _likelihood(residual: NDArray[np.float64], previous: ObjectCloud, current: O
     same, any_two = _SAME_RESIDUAL**2, max(variance, _SAME_RESIDUAL**2)
     ratio = 1.5 * np.log(any_two / same) - residual**2 / 2 * (3 / same - 3 / any_two)
     return float(np.clip(ratio, -_LIKELIHOOD_LIMIT, _LIKELIHOOD_LIMIT).mean())
-
-
-def _faces(normals: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Which of six directions each normal is nearest to."""
-    axis = np.abs(normals).argmax(axis=1)
-    return axis * 2 + (normals[np.arange(len(axis)), axis] > 0)
-
-
-def _within(values: NDArray[np.float64], face: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Values less the mean of their face: light from elsewhere changes whole faces."""
-    mean = np.bincount(face, values, 6) / np.maximum(np.bincount(face, minlength=6), 1)
-    return values - mean[face]

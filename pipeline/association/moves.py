@@ -2,8 +2,8 @@
 
 The two places of a moved object need not be in one view, so no co-visible pair compares them, and where
 things look alike a patch finds its like everywhere. So every object that left its place is laid over every
-object that took one (``registration``), and the pair is judged by how well one can be the other: by shape,
-pattern and colour, and by how often the colours of any two things of this place agree as well.
+object that took one (``object_registration``), and the pair is judged by how well one can be the other: by
+shape, pattern and colour, and by how often the colours of any two things of this place agree as well.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from pipeline.association.cloud_agreement import ObjectCloud, Registration
-from pipeline.association.registration import register
+from pipeline.association.cloud_agreement import ENOUGH_SHARED, ObjectCloud, ObjectRegistration
+from pipeline.association.object_registration import register_objects
 from pipeline.settings import MoveSettings
 
 _THREADS = 2
@@ -27,7 +27,6 @@ _CHROMA_AXES = np.array([[1.0, 0.0, -1.0], [1.0, -2.0, 1.0]]) / np.sqrt([[2.0], 
 _DIRECTIONS = np.array([[1.0, 0.0], [0.0, 1.0], [0.7, 0.7], [0.7, -0.7]])
 _SIZE_IN_RANKING = 0.1
 _FULL_TEXTURE = 0.12
-_ENOUGH_SHARED = 0.3
 FEATURES = (
     "overlap_more",
     "overlap_less",
@@ -74,7 +73,7 @@ class ScoredMove:
 
     previous: int
     current: int
-    registration: Registration
+    registration: ObjectRegistration
     features: NDArray[np.float64]
     log_odds: float
 
@@ -105,8 +104,8 @@ def score_moves(
     if not pairs:
         return []
 
-    def registered(pair: _Pair) -> Registration:
-        return register(pair.previous.cloud, pair.current.cloud, up_world, spacing_m)
+    def registered(pair: _Pair) -> ObjectRegistration:
+        return register_objects(pair.previous.cloud, pair.current.cloud, up_world, spacing_m)
 
     with ThreadPoolExecutor(_THREADS) as threads:
         registrations = list(threads.map(registered, pairs))
@@ -193,7 +192,7 @@ def _alike(
     return kept[: settings.max_registrations]
 
 
-def _features(pair: _Pair, found: Registration) -> list[float]:
+def _features(pair: _Pair, found: ObjectRegistration) -> list[float]:
     """All features but the ranks."""
     textured = min(1.0, found.texture / _FULL_TEXTURE)
     return [
@@ -201,7 +200,7 @@ def _features(pair: _Pair, found: Registration) -> list[float]:
         min(found.overlap_previous, found.overlap_current),
         min(found.shared, 0.5),
         found.likelihood,
-        found.likelihood * min(1.0, found.shared / _ENOUGH_SHARED),
+        found.likelihood * min(1.0, found.shared / ENOUGH_SHARED),
         float(np.arctanh(np.clip(found.texture_correlation, -0.9, 0.97))) * textured,
         textured,
         min(abs(found.gain), 0.6),

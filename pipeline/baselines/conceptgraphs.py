@@ -18,7 +18,6 @@ shared surface here, whatever its size.
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +28,7 @@ from pipeline.baselines.embedding import VisitEmbeddings, averaged_embeddings, m
 from pipeline.baselines.findings import Findings, outcome, undecided_until_the_end
 from pipeline.baselines.instances import instance_geometry
 from pipeline.baselines.light import visit_light
-from pipeline.baselines.object_map import build_object_map
+from pipeline.baselines.object_map import build_object_maps
 from pipeline.change.colocation import nearest_instances
 from pipeline.correspondence.compare import Comparison, VisitImages
 from pipeline.mapping.objects import SessionObjects
@@ -44,9 +43,7 @@ class ConceptGraphsMethod:
 
     def find_objects(self, mapped: MappedVisits) -> tuple[SessionObjects, SessionObjects]:
         """The object maps of both visits, independently of each other."""
-        with ThreadPoolExecutor(2) as threads:
-            previous, current = threads.map(lambda visit: build_object_map(mapped, visit), range(2))
-        return previous, current
+        return build_object_maps(mapped)
 
     def conclude(
         self,

@@ -7,6 +7,8 @@ least ``merge_similarity``, else it founds a new one. An object's embedding is t
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
@@ -130,6 +132,13 @@ def largest_pieces(surface: FusedSurface, owner: NDArray[np.int32]) -> NDArray[n
     first = np.full(len(largest), len(piece), np.int64)
     np.minimum.at(first, kept, piece)
     return np.where((kept > 0) & (piece == first[kept]), kept, 0).astype(np.int32)
+
+
+def build_object_maps(mapped: MappedVisits) -> tuple[SessionObjects, SessionObjects]:
+    """The object maps of both visits, independently of each other."""
+    with ThreadPoolExecutor(2) as threads:
+        previous, current = threads.map(lambda visit: build_object_map(mapped, visit), range(2))
+    return previous, current
 
 
 def build_object_map(mapped: MappedVisits, visit: int) -> SessionObjects:

@@ -20,7 +20,6 @@ Objects within one visit are tracked as in ``object_map``.
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +29,7 @@ from pipeline.baselines.embedding import VisitEmbeddings, averaged_embeddings, m
 from pipeline.baselines.findings import NOT_MET, Findings, outcome
 from pipeline.baselines.instances import InstanceGeometry, instance_geometry
 from pipeline.baselines.light import visit_light
-from pipeline.baselines.object_map import build_object_map
+from pipeline.baselines.object_map import build_object_maps
 from pipeline.baselines.persistence import NOBODY, Candidate, ObjectLibrary
 from pipeline.baselines.range_images import points_in_view
 from pipeline.correspondence.compare import Comparison, VisitImages
@@ -50,9 +49,7 @@ class WheresMyGlassesMethod:
 
     def find_objects(self, mapped: MappedVisits) -> tuple[SessionObjects, SessionObjects]:
         """Objects tracked within either visit."""
-        with ThreadPoolExecutor(2) as threads:
-            previous, current = threads.map(lambda visit: build_object_map(mapped, visit), range(2))
-        return previous, current
+        return build_object_maps(mapped)
 
     def conclude(
         self,

@@ -64,6 +64,8 @@ def decide(
     similarity = (PlaceSimilarity.empty(previous.objects.count), PlaceSimilarity.empty(current.objects.count))
     pattern = (PatternAgreement.empty(previous.objects.count), PatternAgreement.empty(current.objects.count))
     last_keyframe = _last_keyframes(current)
+    # The previous visit was seen as a whole before the current one began.
+    compared1 = _compared(current, observation.of_current, settings)
     evidence: list[tuple[VisitEvidence, VisitEvidence]] = []
     decisions: list[Decision] = []
     for submap, local in enumerate(comparison.evidence):
@@ -75,16 +77,12 @@ def decide(
             so_far.add(added[submap])
         is_met = current.geometry.first_keyframe <= last_keyframe[submap]
         dissimilarity = [change_of_similarity(s.mean, extractor.similarity) for s in similarity]
-        evidence0, appearance0 = _visit_evidence(
-            previous, seen_so_far, ~observation.is_noise0, dissimilarity[0], pattern[0], settings
+        compared0 = _compared(previous, seen_so_far, settings)
+        evidence0 = _visit_evidence(
+            previous, compared0, ~observation.is_noise0, dissimilarity[0], pattern[0], settings
         )
-        evidence1, appearance1 = _visit_evidence(
-            current,
-            observation.of_current,
-            is_met & ~observation.is_noise1,
-            dissimilarity[1],
-            pattern[1],
-            settings,
+        evidence1 = _visit_evidence(
+            current, compared1, is_met & ~observation.is_noise1, dissimilarity[1], pattern[1], settings
         )
         evidence.append((evidence0, evidence1))
         if settings.change.rule == "paper":
@@ -95,7 +93,7 @@ def decide(
         on_submap(submap + 1)
     moves: list[ScoredMove] = []
     if settings.change.rule == "evidence":
-        find_moves = _Moves((previous, current), evidence[-1], appearance1.log_gain, settings)
+        find_moves = _Moves((previous, current), evidence[-1], compared1.appearance.log_gain, settings)
         moves = find_moves.scored
         nearest0, nearest1 = _nearest(previous, current), _nearest(current, previous)
         for submap, pair in enumerate(evidence):
@@ -109,7 +107,7 @@ def decide(
                 current.objects.count,
             )
             decisions.append(decide_by_evidence(*pair, overlap, find_moves, find_moves.likeliest, settings))
-    scale = max(appearance0.scale, appearance1.scale)
+    scale = max(compared0.appearance.scale, compared1.appearance.scale)
     return Conclusion(tuple(decisions), *evidence[-1], association, tuple(moves), scale)
 
 
@@ -129,37 +127,50 @@ def _nearest(own: VisitImages, other: VisitImages) -> NDArray[np.int32]:
     )
 
 
-def _visit_evidence(
-    visit: VisitImages,
-    seen: Observation,
-    is_met: NDArray[np.bool_],
-    dissimilarity: NDArray[np.float64],
-    pattern: PatternAgreement,
-    settings: Settings,
-) -> tuple[VisitEvidence, AppearanceResidual]:
-    surface = visit.geometry.surface
+@dataclass(frozen=True)
+class _Compared:
+    """The surface of one visit against what the other one observed of it; (M,) per voxel."""
+
+    is_observed: NDArray[np.bool_]
+    is_seen_through: NDArray[np.bool_]
+    appearance: AppearanceResidual
+
+
+def _compared(visit: VisitImages, seen: Observation, settings: Settings) -> _Compared:
     through = seen.is_seen_through(settings.observation)
     appearance = appearance_residual(
         visit.geometry.log_colours,
         seen.log_colours,
         seen.has_colour & ~through,
-        surface.normals_world,
+        visit.geometry.surface.normals_world,
     )
+    return _Compared(seen.is_observed, through, appearance)
+
+
+def _visit_evidence(
+    visit: VisitImages,
+    compared: _Compared,
+    is_met: NDArray[np.bool_],
+    dissimilarity: NDArray[np.float64],
+    pattern: PatternAgreement,
+    settings: Settings,
+) -> VisitEvidence:
+    surface = visit.geometry.surface
     evidence = object_evidence(
         visit.objects.instance_of_voxel,
         visit.objects.count,
         is_met,
-        seen.is_observed,
-        through,
-        appearance,
+        compared.is_observed,
+        compared.is_seen_through,
+        compared.appearance,
         visit.geometry.log_colours,
         surface.normals_world,
         surface.points_world,
         dissimilarity,
         pattern,
     )
-    log_odds = change_log_odds(evidence, appearance.scale, settings.change)
-    return VisitEvidence(evidence, log_odds, evidence.voxel_count > 0), appearance
+    log_odds = change_log_odds(evidence, compared.appearance.scale, settings.change)
+    return VisitEvidence(evidence, log_odds, evidence.voxel_count > 0)
 
 
 class _Moves:

@@ -2,7 +2,7 @@
 
 Two rules share the evidence. ``paper``: the association alone decides (Eq. 8). ``evidence``: what changed is
 decided at each place (``change_score``); objects that stayed keep their identity by place, objects that
-left are looked for elsewhere by their patches, and only what left and was not found has disappeared.
+left are looked for elsewhere (``association.moves``), and only what left and was not found has disappeared.
 """
 
 from __future__ import annotations

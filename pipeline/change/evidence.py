@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.change.appearance import MIN_COMPARED_VOXELS, AppearanceResidual
 from pipeline.correspondence.pattern import PatternAgreement
+from pipeline.mapping.colours import within_faces
 
 # Residuals beyond this many spreads of the pair of visits, and beyond this, belong to another surface.
 TAIL_SPREADS = 3.0
@@ -143,7 +144,7 @@ def object_evidence(
         tail[instance] = (magnitude[voxels] > tail_from).mean()
         own = own_log_colours[voxels].mean(axis=1).astype(np.float64)
         other = own + appearance.residual[voxels].mean(axis=1)
-        own, other = _within_faces(own, normals_world[voxels]), _within_faces(other, normals_world[voxels])
+        own, other = within_faces(own, normals_world[voxels]), within_faces(other, normals_world[voxels])
         texture[instance] = own.std()
         correlation[instance] = own @ other / np.sqrt((own @ own) * (other @ other) + 1e-9)
     return ObjectEvidence(
@@ -161,11 +162,3 @@ def object_evidence(
         pattern_correlation=pattern.mean_correlation,
         pattern_lost=pattern.lost_share,
     )
-
-
-def _within_faces(values: NDArray[np.float64], normals: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Values less the mean of their face (the six axis directions): shading between faces is no texture."""
-    axis = np.abs(normals).argmax(axis=1)
-    face = axis * 2 + (normals[np.arange(len(axis)), axis] > 0)
-    mean = np.bincount(face, values, 6) / np.maximum(np.bincount(face, minlength=6), 1)
-    return values - mean[face]

@@ -18,6 +18,21 @@ def log_colour(rgb: NDArray[np.uint8]) -> NDArray[np.float32]:
     return np.log(np.clip(rgb, _DARKEST, _BRIGHTEST).astype(np.float32))
 
 
+def within_faces(values: NDArray[np.floating], normals_world: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(n,) values less the mean of their face (the six axis directions): light changes whole faces.
+
+    What is left is texture, whichever side a lamp stands on.
+
+    Args:
+        values: (n,) of points, such as log brightness.
+        normals_world: (n, 3) unit.
+    """
+    axis = np.abs(normals_world).argmax(axis=1)
+    face = axis * 2 + (normals_world[np.arange(len(axis)), axis] > 0)
+    mean = np.bincount(face, values, 6) / np.maximum(np.bincount(face, minlength=6), 1)
+    return np.asarray(values - mean[face], np.float64)
+
+
 class VoxelColours:
     """Incremental mean of log colours per raw voxel, each keyframe first brought to the exposure so far."""
 

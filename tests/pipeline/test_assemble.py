@@ -10,7 +10,7 @@ import pytest
 
 from pipeline import assemble as module
 from pipeline.association.accumulation import AccumulatedAssociation
-from pipeline.association.registration import rotation_about
+from pipeline.association.object_registration import rotation_about
 from pipeline.change.decide import Conclusion
 from pipeline.change.decision import NOT_MET, Decision, Identity, VisitEvidence
 from pipeline.change.evidence import ObjectEvidence

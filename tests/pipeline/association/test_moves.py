@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.association import moves as module
-from pipeline.association.cloud_agreement import ObjectCloud, Registration
+from pipeline.association.cloud_agreement import ObjectCloud, ObjectRegistration
 from pipeline.association.moves import (
     FEATURES,
     Candidate,
@@ -114,11 +114,11 @@ def laid_over(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Counts registrations, and saves their time."""
     calls: list[int] = []
 
-    def instead(previous: ObjectCloud, *_: object) -> Registration:
+    def instead(previous: ObjectCloud, *_: object) -> ObjectRegistration:
         calls.append(len(previous))
-        return Registration(np.eye(4), 0.9, 0.9, 0.9, 0.5, 0.1, 0.1, 0.9, 0.2, 0.0)
+        return ObjectRegistration(np.eye(4), 0.9, 0.9, 0.9, 0.5, 0.1, 0.1, 0.9, 0.2, 0.0)
 
-    monkeypatch.setattr(module, "register", instead)
+    monkeypatch.setattr(module, "register_objects", instead)
     return calls
 
 
@@ -145,7 +145,7 @@ def test_no_more_registrations_than_allowed_and_the_likest_first(laid_over: list
 
 
 def scored_move(previous: int, current: int, log_odds: float) -> ScoredMove:
-    registration = Registration(np.eye(4), 1, 1, 1, 0, 0, 0, 0, 0, 0)
+    registration = ObjectRegistration(np.eye(4), 1, 1, 1, 0, 0, 0, 0, 0, 0)
     return ScoredMove(previous, current, registration, np.zeros(len(FEATURES)), log_odds)
 
 

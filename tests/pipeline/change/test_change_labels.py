@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.association.accumulation import AccumulatedAssociation
 from pipeline.association.aggregation import MatchEvidence
-from pipeline.association.cloud_agreement import Registration
+from pipeline.association.cloud_agreement import ObjectRegistration
 from pipeline.association.moves import FEATURES, ScoredMove
 from pipeline.change.confidence import NO_MOVE_LOG_ODDS, confidence_features, label_confidence
 from pipeline.change.decide import _Moves
@@ -137,7 +137,7 @@ def move(previous: int, current: int, log_odds: float = 2.0, x_m: float = 2.0) -
     """A move along x."""
     T = np.eye(4)
     T[0, 3] = x_m
-    registration = Registration(T, 0.9, 0.9, 0.9, 0.5, 0.1, 0.1, 0.9, 0.2, 0.0)
+    registration = ObjectRegistration(T, 0.9, 0.9, 0.9, 0.5, 0.1, 0.1, 0.9, 0.2, 0.0)
     return ScoredMove(previous, current, registration, np.zeros(len(FEATURES)), log_odds)
 
 

@@ -8,8 +8,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter
 
-from pipeline.association.cloud_agreement import ObjectCloud, Registration
-from pipeline.association.registration import register, rotation_about
+from pipeline.association.cloud_agreement import ObjectCloud, ObjectRegistration
+from pipeline.association.object_registration import register_objects, rotation_about
 from pipeline.camera import is_rigid, rotation_angle_rad
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -78,7 +78,7 @@ def noisy(cloud: ObjectCloud, seed: int = 1) -> ObjectCloud:
     )
 
 
-def error(found: Registration, yaw_rad: float, shift_m: np.ndarray) -> tuple[float, float]:
+def error(found: ObjectRegistration, yaw_rad: float, shift_m: np.ndarray) -> tuple[float, float]:
     """Wrong angle in degrees, and how far the middle of the box was put wrong, metres."""
     R = rotation_about(UP, yaw_rad)
     middle = np.array([0, 0, SIZE_M[2] / 2])
@@ -96,7 +96,7 @@ def error(found: Registration, yaw_rad: float, shift_m: np.ndarray) -> tuple[flo
 def test_printed_box_is_found_however_it_was_turned_and_shifted(yaw: float, shift: tuple) -> None:
     shift_m = np.array(shift)
 
-    found = register(noisy(box()), noisy(moved(box(), yaw, shift_m), 2), UP, SPACING_M)
+    found = register_objects(noisy(box()), noisy(moved(box(), yaw, shift_m), 2), UP, SPACING_M)
 
     angle_deg, distance_m = error(found, yaw, shift_m)
     assert angle_deg < 3
@@ -109,10 +109,10 @@ def test_printed_box_is_found_however_it_was_turned_and_shifted(yaw: float, shif
 
 def test_a_look_alike_of_another_print_agrees_less() -> None:
     shift = np.array([1.0, 2.0, 0.0])
-    same = register(box(), noisy(moved(box(), 1.0, shift)), UP, SPACING_M)
+    same = register_objects(box(), noisy(moved(box(), 1.0, shift)), UP, SPACING_M)
 
     for seed in (1, 2, 3):
-        other = register(box(), noisy(moved(box(seed), 1.0, shift)), UP, SPACING_M)
+        other = register_objects(box(), noisy(moved(box(seed), 1.0, shift)), UP, SPACING_M)
         assert other.overlap > 0.8  # the shapes are one
         assert other.agreement < same.agreement - 0.3
         assert other.likelihood < same.likelihood
@@ -125,7 +125,7 @@ def test_the_gain_of_brightness_is_told_and_does_not_count_as_another_colour() -
         brighter.points_world, brighter.normals_world, brighter.log_colours + 0.4, brighter.viewpoints_world
     )
 
-    found = register(box(), brighter, UP, SPACING_M)
+    found = register_objects(box(), brighter, UP, SPACING_M)
 
     assert found.gain == pytest.approx(0.4, abs=0.03)
     assert found.colour_residual < 0.1
@@ -143,7 +143,7 @@ def ball() -> ObjectCloud:
 def test_plain_ball_is_placed_though_no_turn_of_it_can_be_told() -> None:
     shift = np.array([1.5, -0.5, 0.0])
 
-    found = register(ball(), moved(ball(), 1.0, shift), UP, SPACING_M)
+    found = register_objects(ball(), moved(ball(), 1.0, shift), UP, SPACING_M)
 
     T = found.T_world_motion
     middle = np.array([0, 0, 0.25])
@@ -162,7 +162,7 @@ def test_clouds_of_a_few_points_are_compared_without_a_crash(count: int) -> None
         whole.points_world[:count], whole.normals_world[:count], whole.log_colours[:count], AROUND
     )
 
-    for found in (register(few, whole, UP, SPACING_M), register(whole, few, UP, SPACING_M)):
+    for found in (register_objects(few, whole, UP, SPACING_M), register_objects(whole, few, UP, SPACING_M)):
         assert np.isfinite(found.T_world_motion).all()
         assert np.isfinite(found.agreement)
         assert found.likelihood == -1.0  # too little in common to say anything
@@ -176,7 +176,7 @@ def test_sides_that_were_not_seen_do_not_count_against_it() -> None:
     before, now = seen_from(box(), before_from), moved(seen_from(box(), now_from), 0.0, shift, now_from)
     assert len(before) < 0.7 * len(box())
 
-    found = register(before, now, UP, SPACING_M)
+    found = register_objects(before, now, UP, SPACING_M)
 
     angle_deg, distance_m = error(found, 0.0, shift)
     assert angle_deg < 5  # sides without a counterpart pull a little
@@ -189,7 +189,7 @@ def test_a_part_in_plain_view_that_is_missing_does_count() -> None:
     # Half as tall: the upper half would have been seen.
     low = box(size_m=SIZE_M * [1, 1, 0.5])
 
-    found = register(box(), moved(low, 0.0, np.array([1.0, 0, 0])), UP, SPACING_M)
+    found = register_objects(box(), moved(low, 0.0, np.array([1.0, 0, 0])), UP, SPACING_M)
 
     assert min(found.overlap_previous, found.overlap_current) < 0.7
 

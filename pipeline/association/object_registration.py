@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipeline.association.cloud_agreement import ObjectCloud, Registration, agreement_under
+from pipeline.association.cloud_agreement import ObjectCloud, ObjectRegistration, agreement_under
 
 # Turns about the vertical that are tried, and the sizes of the samples that they are tried with.
 _TURNS = 24
@@ -28,9 +28,9 @@ _SPACINGS_PER_LOG_COLOUR = 4.0
 _REACH_SPACINGS = 3.0
 
 
-def register(
+def register_objects(
     previous: ObjectCloud, current: ObjectCloud, up_world: NDArray[np.floating], spacing_m: float
-) -> Registration:
+) -> ObjectRegistration:
     """Find the motion of an object that stands as upright as before, then let go of upright.
 
     Args:
