@@ -94,7 +94,8 @@ def _numbers(item: MapObject, limits: Limits) -> str:
     return (
         section("Evidence", CASE_WORDS[item.case])
         + "".join(rows)
-        + '<div class="oa-note">The blue tick is each measure&#39;s limit; the sentence above says what decided.</div>'
+        + '<div class="oa-note">The blue tick is the limit of each measure; the sentence above says what '
+        + "decided.</div>"
     )
 
 
