@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,12 +57,15 @@ class Outcome:
         quality: figures about the whole pair, for the manifest.
         moves: pairs of objects that were laid over each other, structured rows; None where the method lays
             none.
+        basis: what the labels follow from, to be decided anew under other limits
+            (``change.basis.DecisionBasis.arrays``); None where the method's labels do not.
     """
 
     assembled: Assembled
     evidence: tuple[NDArray[np.void], NDArray[np.void]]
     quality: dict[str, float]
     moves: NDArray[np.void] | None = None
+    basis: dict[str, NDArray[Any]] | None = None
 
 
 class Method(Protocol):

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from pipeline.assemble import assemble
 from pipeline.association.moves import moves_table
+from pipeline.change.basis import DecisionBasis
 from pipeline.change.change_score import appearance_trust
 from pipeline.change.decide import decide
 from pipeline.change.proposals import propose_changes
@@ -78,4 +79,11 @@ class OasisMethod:
         }
         assembled = assemble(*visits, conclusion, settings)
         moves = moves_table(conclusion.moves, assembled.ids0, assembled.ids1)
-        return Outcome(assembled, (tables[0], tables[1]), quality, moves)
+        basis = DecisionBasis(
+            (conclusion.previous, conclusion.current),
+            conclusion.association.evidence,
+            conclusion.association.proposals,
+            conclusion.overlap,
+            conclusion.moves,
+        )
+        return Outcome(assembled, (tables[0], tables[1]), quality, moves, basis.arrays())

@@ -315,6 +315,7 @@ class ChangeSettings:
     no_appearance_scale: float = setting(
         0.28, "colour spread from which appearance does not count", unit="log units"
     )
+    min_log_odds: float = setting(0.0, "log odds from which a place has changed")
     same_place_overlap: float = setting(0.1, "overlap from which two unchanged objects are one")
     replaced_overlap: float = setting(0.25, "share of the smaller bounds that a replacement has in common")
     tau_d_m: float = setting(0.1, "objects displaced by more than this have moved", unit="m", symbol="tau_d")

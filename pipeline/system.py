@@ -339,6 +339,8 @@ class _Run:
         )
         if outcome.moves is not None:
             self._writer.write_moves(outcome.moves)
+        if outcome.basis is not None:
+            self._writer.write_basis(outcome.basis)
         self._timings_s["write"] = round(time.perf_counter() - started, 3)
         return self._writer.finish(self._manifest(visits, outcome))
 

@@ -27,6 +27,7 @@ from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
+from fixture_basis import small_basis, small_tables
 from fixture_scene import CAMERA, OBJECTS, SceneObject, View, camera_pose, render, seen_by
 from numpy.typing import NDArray
 
@@ -80,6 +81,10 @@ def write_small_result(folder: Path, name: str = "small.oasis", key: str = "smal
         objects = [_map_object(visits, score_matrix, item) for item in OBJECTS]
         event = ReplacedEvent(disappeared_id=8, appeared_id=7, overlap=_overlap(8, 7))
         writer.write_objects(objects, [event], score_matrix, _belief(objects))
+        basis = small_basis(objects, score_matrix)
+        writer.write_basis(basis.arrays())
+        for session, table in enumerate(small_tables(basis)):
+            writer.write_evidence(session, table)
         writer.finish(
             {
                 "settings": Settings().to_dict(),

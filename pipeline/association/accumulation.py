@@ -2,16 +2,47 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.association.aggregation import MatchEvidence
-from pipeline.association.assignment import associate
+from pipeline.association.assignment import assign, associate
 from pipeline.association.cases import match_case
 from pipeline.result import MatchCase
 from pipeline.settings import AssociationSettings
 
 MIN_DEFERRED_LINKS = 3
+
+
+@dataclass(frozen=True)
+class Proposals:
+    """Pairs that some submap, alone or with all before it, assigned to each other; the gates come later.
+
+    Attributes:
+        pairs: (P, 2) previous and current instance, counted from 0.
+        sigma, s_bar: (P,) scores of the pair then.
+    """
+
+    pairs: NDArray[np.int64]
+    sigma: NDArray[np.float64]
+    s_bar: NDArray[np.float64]
+
+    @classmethod
+    def empty(cls) -> Proposals:
+        """None yet."""
+        return cls(np.zeros((0, 2), np.int64), np.zeros(0), np.zeros(0))
+
+    def joined(self, evidence: MatchEvidence) -> Proposals:
+        """With what ``evidence`` assigns added."""
+        sigma, s_bar = evidence.sigma, evidence.s_bar
+        rows, columns = assign(sigma)
+        return Proposals(
+            np.concatenate([self.pairs, np.stack([rows, columns], axis=1).astype(np.int64)]),
+            np.concatenate([self.sigma, sigma[rows, columns]]),
+            np.concatenate([self.s_bar, s_bar[rows, columns]]),
+        )
 
 
 class AccumulatedAssociation:
@@ -24,22 +55,32 @@ class AccumulatedAssociation:
     def __init__(self, previous_objects: int, current_objects: int, settings: AssociationSettings) -> None:
         self._settings = settings
         self.evidence = MatchEvidence.empty(previous_objects, current_objects)
-        self._is_candidate = np.zeros((previous_objects, current_objects), bool)
+        self.proposals = Proposals.empty()
+
+    @classmethod
+    def restored(
+        cls, evidence: MatchEvidence, proposals: Proposals, settings: AssociationSettings
+    ) -> AccumulatedAssociation:
+        """As it was when all submaps had come in, under gates that may be other ones."""
+        previous_objects, current_objects = evidence.link_count.shape
+        association = cls(previous_objects, current_objects, settings)
+        association.evidence, association.proposals = evidence, proposals
+        return association
 
     def add_submap(self, local: MatchEvidence) -> None:
         """Take in the evidence of one submap."""
-        settings = self._settings
         self.evidence.merge(local)
         for evidence in (local, self.evidence):
-            for pair in associate(evidence.sigma, evidence.s_bar, settings.tau_sigma, settings.tau_s):
-                self._is_candidate[pair] = True
+            self.proposals = self.proposals.joined(evidence)
 
     def pairs(self) -> list[tuple[int, int]]:
         """A: (previous, current) instances, counted from 0, ascending."""
-        sigma = np.where(self._is_candidate, self.evidence.sigma, 0.0)
-        return associate(
-            sigma, np.where(self._is_candidate, self.evidence.s_bar, 0.0), 0.0, self._settings.tau_s
-        )
+        settings, proposals = self._settings, self.proposals
+        passes = (proposals.sigma >= settings.tau_sigma) & (proposals.s_bar >= settings.tau_s)
+        is_candidate = np.zeros(self.evidence.link_count.shape, bool)
+        is_candidate[tuple(proposals.pairs[passes].T)] = True
+        sigma = np.where(is_candidate, self.evidence.sigma, 0.0)
+        return associate(sigma, np.where(is_candidate, self.evidence.s_bar, 0.0), 0.0, settings.tau_s)
 
     def best_counterparts(self, axis: int) -> NDArray[np.int64]:
         """For each previous (axis 0) or current (axis 1) object, its best counterpart, -1 without links.

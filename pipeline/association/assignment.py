@@ -7,6 +7,16 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 
+def assign(sigma: NDArray[np.floating]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows and columns of the one-to-one assignment of the greatest total sigma; pairs without any are left
+    out, although the Hungarian algorithm gives every row a column."""
+    if not sigma.size:
+        return np.zeros(0, np.intp), np.zeros(0, np.intp)
+    rows, columns = linear_sum_assignment(-sigma)
+    matched = sigma[rows, columns] > 0
+    return rows[matched], columns[matched]
+
+
 def associate(
     sigma: NDArray[np.floating], s_bar: NDArray[np.floating], tau_sigma: float, tau_s: float
 ) -> list[tuple[int, int]]:
@@ -17,14 +27,8 @@ def associate(
         tau_sigma, tau_s: the gates.
 
     Returns:
-        (previous, current) pairs in ascending order. An object without any match is never assigned, although
-        the Hungarian algorithm gives every row a column.
+        (previous, current) pairs in ascending order. An object without any match is never assigned.
     """
-    if not sigma.size:
-        return []
-    rows, columns = linear_sum_assignment(-sigma)
-    return [
-        (int(row), int(column))
-        for row, column in zip(rows, columns, strict=True)
-        if sigma[row, column] > 0 and sigma[row, column] >= tau_sigma and s_bar[row, column] >= tau_s
-    ]
+    rows, columns = assign(sigma)
+    passes = (sigma[rows, columns] >= tau_sigma) & (s_bar[rows, columns] >= tau_s)
+    return list(zip(rows[passes].tolist(), columns[passes].tolist(), strict=True))

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,29 @@ class Candidate:
     voxel_count: int
 
 
+class Move(Protocol):
+    """What the choice among moves rests on; fields as of :class:`ScoredMove`."""
+
+    @property
+    def previous(self) -> int:
+        """Previous instance, counted from 1."""
+
+    @property
+    def current(self) -> int:
+        """Current instance, counted from 1."""
+
+    @property
+    def log_odds(self) -> float:
+        """That both are one object."""
+
+    @property
+    def T_world_motion(self) -> NDArray[np.float64]:
+        """(4, 4), p_current = T p_previous in the world frame, metres."""
+
+
+AnyMove = TypeVar("AnyMove", bound=Move)
+
+
 @dataclass(frozen=True)
 class ScoredMove:
     """A previous and a current instance (counted from 1) that may be one object.
@@ -76,6 +100,11 @@ class ScoredMove:
     registration: ObjectRegistration
     features: NDArray[np.float64]
     log_odds: float
+
+    @property
+    def T_world_motion(self) -> NDArray[np.float64]:
+        """(4, 4), p_current = T p_previous in the world frame, metres."""
+        return self.registration.T_world_motion
 
 
 @dataclass(frozen=True)
@@ -123,8 +152,8 @@ def score_moves(
 
 
 def choose_moves(
-    scored: Sequence[ScoredMove], is_possible: Callable[[ScoredMove], bool], settings: MoveSettings
-) -> list[ScoredMove]:
+    scored: Sequence[AnyMove], is_possible: Callable[[AnyMove], bool], settings: MoveSettings
+) -> list[AnyMove]:
     """One-to-one moves of the greatest total log odds, each above the least (Hungarian)."""
     possible = [move for move in scored if move.log_odds > settings.min_log_odds and is_possible(move)]
     if not possible:

@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.association.accumulation import AccumulatedAssociation
-from pipeline.association.moves import Candidate, ScoredMove, choose_moves, score_moves
+from pipeline.association.moves import Candidate, ScoredMove, score_moves
 from pipeline.association.object_clouds import ObjectClouds
-from pipeline.camera import rotation_angle_rad
 from pipeline.change.appearance import AppearanceResidual, appearance_residual
 from pipeline.change.change_score import change_log_odds
 from pipeline.change.colocation import nearest_instances, overlap_matrix
-from pipeline.change.confidence import NO_MOVE_LOG_ODDS
 from pipeline.change.decision import Decision, VisitEvidence, decide_by_association, decide_by_evidence
 from pipeline.change.evidence import object_evidence
+from pipeline.change.move_choice import MoveChoice
 from pipeline.change.observation import Observation
 from pipeline.change.observe import MutualObservation
 from pipeline.correspondence.compare import Comparison, VisitImages
@@ -38,6 +37,7 @@ class Conclusion:
         association: accumulated scores of all pairs.
         moves: pairs of changed objects that were laid over each other, chosen or not.
         appearance_scale: spread of the colour residual between the visits, log units: a quality figure.
+        overlap: (n, m) of the objects' places, voxel intersection over union; None where the rule needs none.
     """
 
     decisions: tuple[Decision, ...]
@@ -46,6 +46,7 @@ class Conclusion:
     association: AccumulatedAssociation
     moves: tuple[ScoredMove, ...]
     appearance_scale: float
+    overlap: NDArray[np.float64] | None = None
 
 
 def decide(
@@ -92,9 +93,10 @@ def decide(
             )
         on_submap(submap + 1)
     moves: list[ScoredMove] = []
+    overlap: NDArray[np.float64] | None = None
     if settings.change.rule == "evidence":
-        find_moves = _Moves((previous, current), evidence[-1], compared1.appearance.log_gain, settings)
-        moves = find_moves.scored
+        moves = _scored_moves((previous, current), evidence[-1], compared1.appearance.log_gain, settings)
+        find_moves = MoveChoice(moves, evidence[-1], settings)
         nearest0, nearest1 = _nearest(previous, current), _nearest(current, previous)
         for submap, pair in enumerate(evidence):
             is_met = current.geometry.first_keyframe <= last_keyframe[submap]
@@ -108,7 +110,7 @@ def decide(
             )
             decisions.append(decide_by_evidence(*pair, overlap, find_moves, find_moves.likeliest, settings))
     scale = max(compared0.appearance.scale, compared1.appearance.scale)
-    return Conclusion(tuple(decisions), *evidence[-1], association, tuple(moves), scale)
+    return Conclusion(tuple(decisions), *evidence[-1], association, tuple(moves), scale, overlap)
 
 
 def _last_keyframes(visit: VisitImages) -> list[int]:
@@ -173,71 +175,32 @@ def _visit_evidence(
     return VisitEvidence(evidence, log_odds, evidence.voxel_count > 0)
 
 
-class _Moves:
-    """Moves between objects that changed by the end; scored once, then chosen anew after every submap."""
-
-    def __init__(
-        self,
-        visits: tuple[VisitImages, VisitImages],
-        final: tuple[VisitEvidence, VisitEvidence],
-        log_gain: NDArray[np.float64],
-        settings: Settings,
-    ) -> None:
-        self._settings = settings
-        # Colours of the current visit are brought into the light of the previous one.
-        clouds = [
-            ObjectClouds(visit.geometry, visit.objects, gain)
-            for visit, gain in zip(visits, (np.zeros(3), -log_gain), strict=True)
+def _scored_moves(
+    visits: tuple[VisitImages, VisitImages],
+    final: tuple[VisitEvidence, VisitEvidence],
+    log_gain: NDArray[np.float64],
+    settings: Settings,
+) -> list[ScoredMove]:
+    """Moves between objects that changed by the end; scored once, chosen anew after every submap."""
+    # Colours of the current visit are brought into the light of the previous one.
+    clouds = [
+        ObjectClouds(visit.geometry, visit.objects, gain)
+        for visit, gain in zip(visits, (np.zeros(3), -log_gain), strict=True)
+    ]
+    candidates = [
+        [
+            Candidate(
+                int(instance),
+                of_visit.of(int(instance)),
+                float(evidence.objects.seen_through[instance]),
+                int(evidence.objects.voxel_count[instance]),
+            )
+            for instance in np.flatnonzero(
+                evidence.is_met & (evidence.log_odds > settings.moves.least_change_log_odds)
+            )
+            if instance > 0
         ]
-        candidates = [
-            [
-                Candidate(
-                    int(instance),
-                    of_visit.of(int(instance)),
-                    float(evidence.objects.seen_through[instance]),
-                    int(evidence.objects.voxel_count[instance]),
-                )
-                for instance in np.flatnonzero(
-                    evidence.is_met & (evidence.log_odds > settings.moves.least_change_log_odds)
-                )
-                if instance > 0
-            ]
-            for of_visit, evidence in zip(clouds, final, strict=True)
-        ]
-        surface = visits[0].geometry.surface
-        self.scored = score_moves(
-            candidates[0], candidates[1], surface.up_world, clouds[0].cell_m, settings.moves
-        )
-        self._coverage = (final[0].objects.coverage, final[1].objects.coverage)
-        self._centroids = final[0].objects.centroid_world
-        self.likeliest = (
-            np.full(len(final[0].log_odds), NO_MOVE_LOG_ODDS),
-            np.full(len(final[1].log_odds), NO_MOVE_LOG_ODDS),
-        )
-        for move in self.scored:
-            for of_visit, instance in zip(self.likeliest, (move.previous, move.current), strict=True):
-                of_visit[instance] = max(of_visit[instance], move.log_odds)
-
-    def __call__(self, previous: set[int], current: set[int]) -> list[ScoredMove]:
-        return choose_moves(
-            self.scored,
-            lambda move: (
-                move.previous in previous
-                and move.current in current
-                and self._is_observed(move)
-                and self._has_moved(move)
-            ),
-            self._settings.moves,
-        )
-
-    def _is_observed(self, move: ScoredMove) -> bool:
-        """One place was seen without the object; where it stands now need not have been looked at before."""
-        coverage = (self._coverage[0][move.previous], self._coverage[1][move.current])
-        return bool(max(coverage) >= self._settings.change.nu_min)
-
-    def _has_moved(self, move: ScoredMove) -> bool:
-        T = move.registration.T_world_motion
-        centroid = self._centroids[move.previous]
-        shift_m = float(np.linalg.norm(T[:3, :3] @ centroid + T[:3, 3] - centroid))
-        turn_deg = float(np.degrees(rotation_angle_rad(np.eye(3), T[:3, :3])))
-        return shift_m > self._settings.change.tau_d_m or turn_deg > self._settings.moves.min_rotation_deg
+        for of_visit, evidence in zip(clouds, final, strict=True)
+    ]
+    up_world = visits[0].geometry.surface.up_world
+    return score_moves(candidates[0], candidates[1], up_world, clouds[0].cell_m, settings.moves)

@@ -7,7 +7,7 @@ left are looked for elsewhere (``association.moves``), and only what left and wa
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from pipeline.association.accumulation import AccumulatedAssociation
-from pipeline.association.moves import ScoredMove
+from pipeline.association.moves import Move
 from pipeline.change.confidence import NO_MOVE_LOG_ODDS, confidence_features, label_confidence
 from pipeline.change.evidence import ObjectEvidence
 from pipeline.change.labels import labels_from_association
@@ -85,7 +85,7 @@ class Decision:
 
 
 # Chooses moves among those between two sets of instances (counted from 1) that may have moved.
-FindMoves = Callable[[set[int], set[int]], list[ScoredMove]]
+FindMoves = Callable[[set[int], set[int]], Sequence[Move]]
 
 
 def decide_by_association(
@@ -151,7 +151,9 @@ def decide_by_evidence(
     visits = (previous, current)
     change = settings.change
     log_odds = _agreed(previous, current, overlap)
-    changed = [(odds > 0) & visit.is_met for odds, visit in zip(log_odds, visits, strict=True)]
+    changed = [
+        (odds > change.min_log_odds) & visit.is_met for odds, visit in zip(log_odds, visits, strict=True)
+    ]
     for of_visit in changed:
         of_visit[0] = False  # background is no object, however much of it looks changed
     labels = [
@@ -179,8 +181,7 @@ def decide_by_evidence(
         for codes, odds, visit, move_odds in zip(labels, log_odds, visits, likeliest, strict=True)
     ]
     moved = tuple(
-        Identity(m.previous, m.current, float(confidence[0][m.previous]), m.registration.T_world_motion)
-        for m in moves
+        Identity(m.previous, m.current, float(confidence[0][m.previous]), m.T_world_motion) for m in moves
     )
     return _finished(
         (*identities, *moved),

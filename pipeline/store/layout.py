@@ -58,6 +58,11 @@ class ResultLayout:
         """Pairs of objects that were laid over each other; not every method writes it."""
         return self.root / "moves.npy"
 
+    @property
+    def basis(self) -> Path:
+        """What the labels follow from; not every method writes it, and older results lack it."""
+        return self.root / "basis.npz"
+
     def image(self, session: int, frame_index: int) -> Path:
         """JPEG of a keyframe."""
         return self.session(session) / "images" / f"{frame_index:05d}.jpg"

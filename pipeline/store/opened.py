@@ -170,6 +170,19 @@ class StoredResult:
         """
         return read_array(self.layout.moves) if self.layout.moves.exists() else None
 
+    @property
+    def basis_arrays(self) -> Mapping[str, NDArray[Any]] | None:
+        """What the labels follow from, for ``pipeline.change.basis``; None where it was not stored."""
+        if not self.layout.basis.exists():
+            return None
+        try:
+            with np.load(self.layout.basis, allow_pickle=False) as arrays:
+                return dict(arrays)
+        except Exception as error:  # zipfile, zlib and numpy raise many kinds for a damaged file
+            raise ResultError(
+                f"{self.layout.basis} is not readable", f"the result is damaged, {_RUN_AGAIN}"
+            ) from error
+
     @cached_property
     def _by_id(self) -> dict[int, MapObject]:
         return {item.object_id: item for item in self.objects}

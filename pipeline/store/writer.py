@@ -229,6 +229,10 @@ class ResultWriter:
         """Structured rows, one per pair of objects that was laid over each other."""
         write_array(self.layout.moves, moves)
 
+    def write_basis(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """What the labels follow from (``pipeline.change.basis``), as named arrays."""
+        write_arrays(self.layout.basis, **arrays)
+
     def write_objects(
         self,
         objects: Sequence[MapObject],

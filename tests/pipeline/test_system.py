@@ -17,6 +17,7 @@ import pipeline.system as run_module
 from pipeline.association.moves import FEATURES
 from pipeline.camera import is_rigid
 from pipeline.change.decision import NOT_MET
+from pipeline.change.relabel import what_if
 from pipeline.errors import SceneMismatchError
 from pipeline.progress import ProgressEvent, Warned
 from pipeline.result import ChangeLabel, Result
@@ -213,6 +214,14 @@ def test_what_was_laid_over_what_is_told_and_adds_up(finished: Result) -> None:
         assert shift_m > SETTINGS.change.tau_d_m or is_turned
 
 
+def test_labels_follow_again_from_what_is_stored(finished: Result) -> None:
+    again = what_if(finished)
+
+    assert again.under(SETTINGS).flips == ()
+    labels = {item.object_id: item.label for item in finished.objects}
+    assert {i: again.under(SETTINGS).label_of(i) for i in labels} == labels
+
+
 def test_changes_of_the_hall_are_found(finished: Result) -> None:
     def machine_labels(visit: int, object_id: int) -> set[ChangeLabel]:
         low, high = (np.array(corner) for corner in OBJECTS[object_id - 1].boxes[visit])
@@ -240,12 +249,21 @@ def test_heatmaps_are_known_where_visits_overlap_and_nan_elsewhere(finished: Res
                 assert np.isfinite(geometric).mean() > 0.4, (session.index, k)
 
 
-def test_paper_rule_runs_and_differs_only_in_its_rule(archives: tuple[Path, Path], tmp_path: Path) -> None:
+def test_paper_rule_runs_and_differs_only_in_its_rule(
+    archives: tuple[Path, Path], finished: Result, tmp_path: Path
+) -> None:
     result = run(
         *archives, settings=SETTINGS.override("change.rule", "paper"), output=tmp_path / "paper.oasis"
     )
 
     assert result.manifest["settings"]["change"]["rule"] == "paper"
+    assert what_if(result).under(SETTINGS.override("change.rule", "paper")).flips == ()
+    assert not what_if(result).can_decide_by_evidence
+    # What the other result says it would be under this rule is what a run under it gives.
+    asked = what_if(finished).under(SETTINGS.override("change.rule", "paper"))
+    for visit, ids in enumerate(("row_object_ids", "column_object_ids")):
+        would = [asked.by_visit[visit][i] for i in getattr(finished.score_matrix, ids).tolist()]
+        assert would == [result.object(i).label for i in getattr(result.score_matrix, ids).tolist()]
     assert len(result.moves) == 0
     assert {o.T_world_motion for o in result.objects} == {None}
     for found in result.objects:

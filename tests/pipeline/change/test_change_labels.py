@@ -12,7 +12,6 @@ from pipeline.association.aggregation import MatchEvidence
 from pipeline.association.cloud_agreement import ObjectRegistration
 from pipeline.association.moves import FEATURES, ScoredMove
 from pipeline.change.confidence import NO_MOVE_LOG_ODDS, confidence_features, label_confidence
-from pipeline.change.decide import _Moves
 from pipeline.change.decision import (
     NOT_MET,
     Decision,
@@ -22,6 +21,7 @@ from pipeline.change.decision import (
 )
 from pipeline.change.evidence import ObjectEvidence
 from pipeline.change.labels import labels_from_association
+from pipeline.change.move_choice import MoveChoice
 from pipeline.change.replaced import bounds_overlap, find_replaced
 from pipeline.result import ChangeLabel as L
 from pipeline.settings import AssociationSettings, ChangeSettings, Settings
@@ -228,10 +228,10 @@ def test_what_was_not_met_did_not_move() -> None:
 
 @pytest.mark.parametrize(("left", "taken", "seen"), [(0.49, 0.49, False), (0.5, 0, True), (0, 1, True)])
 def test_one_of_the_two_places_of_a_move_was_observed(left: float, taken: float, seen: bool) -> None:
-    moves = _Moves.__new__(_Moves)
-    moves._coverage, moves._settings = (np.array([1, left]), np.array([1, taken])), SETTINGS
+    visits = visit([0.0], coverage=[left]), visit([0.0], coverage=[taken])
+    found = move(1, 1)
 
-    assert moves._is_observed(move(1, 1)) is seen
+    assert MoveChoice([found], visits, SETTINGS)({1}, {1}) == ([found] if seen else [])
 
 
 def test_object_that_moved_is_not_tied_to_what_stands_at_its_place() -> None:
