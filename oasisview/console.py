@@ -12,7 +12,7 @@ from pipeline.progress import STAGES, ProgressEvent, Warned
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-_TITLES = {**dict(STAGES), "generate": "Recording two synthetic visits"}
+_TITLES = {**dict(STAGES), "generate": "Recording two synthetic visits", "export": "Writing the export"}
 _SECONDS_BETWEEN_LINES = 5.0
 
 

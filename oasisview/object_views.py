@@ -63,6 +63,7 @@ class ObjectViews:
         result: where the pictures come from.
         mask: object ids of a keyframe, by visit and keyframe.
         register: offers a picture to browsers under a name, and returns its address.
+        crop_quality: of the pictures' JPEG, 0 to 100.
     """
 
     def __init__(
@@ -70,11 +71,14 @@ class ObjectViews:
         result: Result,
         mask: Callable[[int, int], NDArray[np.uint16]],
         register: Callable[[str, Callable[[], Asset | None]], str],
+        *,
+        crop_quality: int = 95,
     ) -> None:
         self._result = result
         self._objects: dict[int, MapObject] = {item.object_id: item for item in result.objects}
         self._mask = mask
         self._register = register
+        self._crop_quality = crop_quality
         self.best = lru_cache(maxsize=1024)(self._best)
         self.before_after = lru_cache(maxsize=256)(self._before_after)
 
@@ -171,7 +175,8 @@ class ObjectViews:
             int(left * across) : max(int((left + width) * across), int(left * across) + 1),
         ]
         size = (_CROP_WIDTH_PX, round(_CROP_WIDTH_PX / crops.CROP_ASPECT))
-        encoded, data = cv2.imencode(".jpg", cv2.resize(part, size, interpolation=cv2.INTER_CUBIC))
+        picture = cv2.resize(part, size, interpolation=cv2.INTER_CUBIC)
+        encoded, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, self._crop_quality])
         return Asset("image/jpeg", data.tobytes()) if encoded else None
 
     def _before_after(self, object_id: int) -> BeforeAfter:

@@ -9,9 +9,10 @@ import numpy as np
 import tifffile
 from numpy.typing import NDArray
 
-from oasisview.export.exporter import ReviewedResult
+from oasisview.export.exporter import ReviewedResult, Steps
 from oasisview.export.folder import atomic_folder
 from oasisview.heatmap_colours import colour_geometric, colour_semantic
+from pipeline.progress import Report, silent
 from pipeline.result import SessionResult
 
 _FILE_NAMES = r"\d+/\d{5,}\.(semantic|geometric)\.(tif|png)"
@@ -32,13 +33,15 @@ class HeatmapExporter:
     suffix = ""
     summary = "folder of semantic and geometric heatmaps of every keyframe (TIFF and PNG)"
 
-    def write(self, reviewed: ReviewedResult, out_path: Path) -> None:
+    def write(self, reviewed: ReviewedResult, out_path: Path, report: Report = silent) -> None:
         """Write the folder; an earlier export there is replaced. See ``Exporter.write``."""
+        steps = Steps(report, sum(len(session.keyframes) for session in reviewed.result.sessions))
         with atomic_folder(out_path, earlier_files=_FILE_NAMES) as folder:
             for session in reviewed.result.sessions:
                 (folder / str(session.index)).mkdir()
                 for k in range(len(session.keyframes)):
                     _write_keyframe(session, k, folder / str(session.index))
+                    steps.step()
 
 
 def _write_keyframe(session: SessionResult, k: int, folder: Path) -> None:

@@ -20,7 +20,7 @@ def object_rows(reviewed: ReviewedResult) -> list[dict[str, Any]]:
     other visit, chosen or rejected (its own id for an object of both visits). ``confidence`` is the
     machine's, of its own label. ``decided_*`` and ``why`` belong to the person whose label stands.
     """
-    return [_row(reviewed, item) for item in reviewed.result.objects]
+    return [_row(reviewed, item) for item in reviewed.objects]
 
 
 def _row(reviewed: ReviewedResult, item: MapObject) -> dict[str, Any]:

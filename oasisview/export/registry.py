@@ -7,22 +7,26 @@ from pathlib import Path
 from oasisview.export.exporter import Exporter, ReviewedResult
 from oasisview.export.heatmaps import HeatmapExporter
 from oasisview.export.ply_points import PlyExporter
+from oasisview.export.report import ReportExporter
 from oasisview.export.tables import CsvExporter, JsonExporter
 from pipeline.errors import InputError
+from pipeline.progress import Report, silent
 from pipeline.store import open_result
 
 FORMATS: dict[str, Exporter] = {
-    exporter.name: exporter for exporter in (PlyExporter(), CsvExporter(), JsonExporter(), HeatmapExporter())
+    exporter.name: exporter
+    for exporter in (PlyExporter(), CsvExporter(), JsonExporter(), HeatmapExporter(), ReportExporter())
 }
 
 
-def export(result_path: str | Path, format: str, out_path: str | Path) -> None:
+def export(result_path: str | Path, format: str, out_path: str | Path, report: Report = silent) -> None:
     """Write a result with inspectors' decisions applied.
 
     Args:
         result_path: the result folder.
         format: a name in ``FORMATS``.
         out_path: file or (``heatmaps``) folder; an earlier export there is replaced in one step.
+        report: hears how far it is.
 
     Raises:
         InputError: unknown format, or ``out_path`` must not be replaced.
@@ -38,4 +42,4 @@ def export(result_path: str | Path, format: str, out_path: str | Path) -> None:
         raise InputError(f"{out} is a folder", f"name a file, such as {out / ('map' + exporter.suffix)}")
     if out.resolve().is_relative_to(Path(result_path).resolve()):
         raise InputError(f"{out} is inside the result", "export to a place outside the result folder")
-    exporter.write(ReviewedResult.of(result), out)
+    exporter.write(ReviewedResult.of(result), out, report)

@@ -10,6 +10,7 @@ from typing import Any
 
 from oasisview.export.exporter import ReviewedResult
 from oasisview.export.object_rows import object_rows
+from pipeline.progress import Report, silent
 from pipeline.store.files import atomic_file
 
 # A spreadsheet takes a cell that begins so for a formula, and people write names and reasons.
@@ -24,7 +25,7 @@ class JsonExporter:
     suffix = ".json"
     summary = "one row per object with labels, evidence and decisions"
 
-    def write(self, reviewed: ReviewedResult, out_path: Path) -> None:
+    def write(self, reviewed: ReviewedResult, out_path: Path, report: Report = silent) -> None:
         """Write the file; see ``Exporter.write``."""
         text = json.dumps(object_rows(reviewed), indent=1, ensure_ascii=False, allow_nan=False)
         with atomic_file(out_path) as file:
@@ -38,7 +39,7 @@ class CsvExporter:
     suffix = ".csv"
     summary = "one row per object with labels, evidence and decisions, for spreadsheets"
 
-    def write(self, reviewed: ReviewedResult, out_path: Path) -> None:
+    def write(self, reviewed: ReviewedResult, out_path: Path, report: Report = silent) -> None:
         """Write the file; see ``Exporter.write``."""
         rows = object_rows(reviewed)
         text = io.StringIO(newline="")

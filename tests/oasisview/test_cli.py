@@ -117,11 +117,11 @@ def test_runs_as_a_module() -> None:
         ),
         (
             ["export", "gone.oasis", "--format", "laz", "-o", "x"],
-            "oasisview: export format laz is not in this version: choose ply, csv, json, heatmaps",
+            "oasisview: export format laz is not in this version: choose ply, csv, json, heatmaps, report",
         ),
         (
             ["export", "gone.oasis", "--format", "docx", "-o", "x"],
-            "oasisview: export format docx does not exist: choose ply, csv, json, heatmaps",
+            "oasisview: export format docx does not exist: choose ply, csv, json, heatmaps, report",
         ),
         (
             ["export", "gone.oasis", "--format", "ply", "-o", "x"],

@@ -7,19 +7,25 @@ from pathlib import Path
 
 import pytest
 
+import oasisview.export.exporter as exporter_module
 import oasisview.export.heatmaps as heatmaps_module
 import oasisview.export.ply_points as ply_module
+from oasisview.commands import export as command
 from oasisview.export import FORMATS, export
 from pipeline.errors import InputError, ResultError, StorageError
 
 
 def test_formats_are_those_of_the_contract() -> None:
-    assert list(FORMATS) == ["ply", "csv", "json", "heatmaps"]
-    assert [exporter.suffix for exporter in FORMATS.values()] == [".ply", ".csv", ".json", ""]
+    suffixes = {name: exporter.suffix for name, exporter in FORMATS.items()}
+    assert suffixes == {"ply": ".ply", "csv": ".csv", "json": ".json", "heatmaps": "", "report": ".html"}
+
+
+def test_the_commands_help_says_what_the_formats_are() -> None:
+    assert {name: exporter.summary for name, exporter in FORMATS.items()} == command.FORMATS
 
 
 def test_unknown_format_lists_the_others(small_result_path: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"'xls': choose one of ply, csv, json, heatmaps$"):
+    with pytest.raises(InputError, match=r"'xls': choose one of ply, csv, json, heatmaps, "):
         export(small_result_path, "xls", tmp_path / "map.xls")
 
 
@@ -76,7 +82,7 @@ def test_full_disk_leaves_the_earlier_export(
 def test_failing_halfway_leaves_no_file(
     small_result_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ply_module, "CHUNK_POINTS", 1000)
+    monkeypatch.setattr(exporter_module, "CHUNK_POINTS", 1000)
     written = []
     whole = ply_module._vertices
 

@@ -7,7 +7,7 @@ import open3d as o3d
 import pytest
 import trimesh
 
-from oasisview.export import export, ply_points
+from oasisview.export import export, exporter
 from oasisview.palette import DARK, LIGHT, label_table
 from pipeline.ply import read_ply
 from pipeline.result import ChangeLabel
@@ -98,7 +98,7 @@ def test_chunks_make_the_same_file(
     reviewed_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     export(reviewed_path, "ply", tmp_path / "whole.ply")
-    monkeypatch.setattr(ply_points, "CHUNK_POINTS", 777)
+    monkeypatch.setattr(exporter, "CHUNK_POINTS", 777)
     export(reviewed_path, "ply", tmp_path / "chunks.ply")
     assert (tmp_path / "chunks.ply").read_bytes() == (tmp_path / "whole.ply").read_bytes()
 
