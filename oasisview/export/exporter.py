@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from oasisview.review import Decision, Event, FinalLabel, Journal, Kind
+from oasisview.review import CorrectedMap, Decision, Event, FinalLabel, Journal, Kind, corrected_result
 from pipeline.progress import ProgressEvent, Report, silent
 from pipeline.result import ChangeLabel, MapObject, ReplacedEvent, Result, SessionResult
 
@@ -26,22 +26,38 @@ class ReviewedResult:
     corrected reaches every format.
 
     Attributes:
-        final: final label of every object, by object id.
+        result: with corrections applied: its objects, replaced events, points and masks are what people
+            made of those that the machine found; ``corrected.machine`` holds the machine's.
+        final: final label of every object of ``result``, by object id.
         notes: notes that were not taken back, in the order they were written.
         events: the whole journal, oldest first.
+        corrected: what every object is made of, and what is no object.
     """
 
     result: Result
     final: Mapping[int, FinalLabel]
-    notes: tuple[Decision, ...] = ()
-    events: tuple[Event, ...] = ()
+    notes: tuple[Decision, ...]
+    events: tuple[Event, ...]
+    corrected: CorrectedMap
 
     @classmethod
     def of(cls, result: Result) -> ReviewedResult:
         """The result with the decisions in its journal; without a journal the machine's labels stand."""
         with Journal.of(result) as journal:
             notes = tuple(d for d in journal.decisions() if d.kind is Kind.NOTE and not d.undone)
-            return cls(result, journal.final_labels(), notes, journal.changes_since(0))
+            corrected, events = journal.corrected(), journal.changes_since(0)
+        final = {number: entry.final for number, entry in corrected.objects.items()}
+        return cls(corrected_result(result, corrected), final, notes, events, corrected)
+
+    def machine_label(self, object_id: int) -> ChangeLabel:
+        """The machine's label of an object; of a corrected one that of its largest fragment."""
+        machine = self.corrected.machine
+        largest = max(sorted(self.corrected.objects[object_id].members), key=machine.points)
+        return machine.objects[largest.object_id].label
+
+    def notes_of(self, object_id: int) -> tuple[Decision, ...]:
+        """The notes about an object, those included that were about what it is made of."""
+        return tuple(n for n in self.notes if self.corrected.present_id(n.object_id) == object_id)
 
     @property
     def objects(self) -> tuple[MapObject, ...]:

@@ -19,6 +19,8 @@ def object_rows(reviewed: ReviewedResult) -> list[dict[str, Any]]:
     centroid in the first visit where there were several. ``counterpart_id`` is the best match in the
     other visit, chosen or rejected (its own id for an object of both visits). ``confidence`` is the
     machine's, of its own label. ``decided_*`` and ``why`` belong to the person whose label stands.
+    ``machine_ids`` are the objects of the machine that people made this one of (its own id where nobody
+    corrected it); ``label_machine`` is that of the largest. What people said is no object has no row.
     """
     return [_row(reviewed, item) for item in reviewed.objects]
 
@@ -29,8 +31,9 @@ def _row(reviewed: ReviewedResult, item: MapObject) -> dict[str, Any]:
     several = len(item.sightings) > 1
     return {
         "id": item.object_id,
-        "label_machine": item.label.name.lower(),
+        "label_machine": reviewed.machine_label(item.object_id).name.lower(),
         "label_final": final.label.name.lower(),
+        "machine_ids": list(reviewed.corrected.objects[item.object_id].machine_ids),
         "sessions_seen": [sighting.session for sighting in item.sightings],
         **_xyz("centroid", last.centroid_world_m if last else None),
         **_xyz("extent", last.extent_m if last else None),
@@ -49,9 +52,7 @@ def _row(reviewed: ReviewedResult, item: MapObject) -> dict[str, Any]:
         "decided_at": final.decided_at,
         "why": final.why,
         "notes": [
-            {"who": note.who, "at": note.at, "text": note.why}
-            for note in reviewed.notes
-            if note.object_id == item.object_id
+            {"who": note.who, "at": note.at, "text": note.why} for note in reviewed.notes_of(item.object_id)
         ],
     }
 
@@ -64,7 +65,9 @@ def _counterpart_id(result: Result, item: MapObject) -> int | None:
         return None
     matrix = result.score_matrix
     ids = matrix.column_object_ids if item.sightings[0].session == 0 else matrix.row_object_ids
-    return int(ids[item.counterpart_instance]) if item.counterpart_instance < len(ids) else None
+    if item.counterpart_instance >= len(ids):
+        return None
+    return int(ids[item.counterpart_instance]) or None  # 0: somebody said it is no object
 
 
 def _xyz(name: str, values: Sequence[float] | None) -> dict[str, float | None]:

@@ -26,7 +26,7 @@ class ReportCards:
     def __init__(self, reviewed: ReviewedResult, changes: list[Change]) -> None:
         result = reviewed.result
         self._limits = Limits.of(result)
-        self._notes = reviewed.notes
+        self._notes_of = reviewed.notes_of
         self._number = {change.item.object_id: change.number for change in changes}
         self._taken_by = {
             e.disappeared_id: e.appeared_id for e in reviewed.replaced if is_standing(reviewed, e)
@@ -107,7 +107,7 @@ class ReportCards:
         machine = wording.LABEL_NAMES[item.label]
         rows.append(("confidence", f"{wording.percent(item.confidence)} (machine: {machine})"))
         rows.append(("decision", decided(change)))
-        rows += [("note", f"{n.who}: {n.why}") for n in self._notes if n.object_id == item.object_id]
+        rows += [("note", f"{n.who}: {n.why}") for n in self._notes_of(item.object_id)]
         cells = "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in rows)
         return f"<dl>{cells}</dl>"
 

@@ -48,11 +48,17 @@ def _row(event: Event, *, struck: bool) -> str:
         Kind.NOTE: "note",
         Kind.UNDO: f"undone, {new} again",
         Kind.REDO: f"redone, {new} again",
+        Kind.MERGE: f"merged with others, now {new}",
+        Kind.SAME: f"the same as another, now {new}",
+        Kind.SPLIT: f"not one object, now {new}",
+        Kind.DROP: "not an object",
+        Kind.KEEP: "an object after all",
+        Kind.RESTORE: "an earlier state restored",
     }[event.kind]
     reason = f"<q>{escape(event.why)}</q>" if event.why else ""
     return (
         f'<div class="oa-entry{" oa-undone" if struck else ""}" role="button" tabindex="0" '
-        f'data-event="{event.id}" {sends("select", event.object_id)}>{chip(event.new_label)}'
-        f"<span><b>#{event.object_id}</b> {what}{reason}"
+        f'data-event="{event.id}" {sends("select", max(event.object_id, 1))}>{chip(event.new_label)}'
+        f"<span><b>{f'#{event.object_id}' if event.object_id else 'All'}</b> {what}{reason}"
         f"<small>{escape(event.who)} \u00b7 {escape(when(event.at))}</small></span></div>"
     )

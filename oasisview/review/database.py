@@ -9,30 +9,48 @@ from contextlib import closing
 from pathlib import Path
 
 from oasisview.review.events import Event, Kind
+from oasisview.review.fragments import decode, encode
 from pipeline.errors import OasisError, ResultError, StorageError
 from pipeline.result import ChangeLabel
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 APPLICATION_ID = 0x4F415349  # "OASI" in the header tells our files from other programs'
 
-_COLUMNS = ("id", "at", "who", "kind", "object_id", "old_label", "new_label", "why", "target_id")
-_SCHEMA = (
-    """CREATE TABLE events (
+_FIRST_COLUMNS = ("id", "at", "who", "kind", "object_id", "old_label", "new_label", "why", "target_id")
+_COLUMNS = (*_FIRST_COLUMNS, "details")
+_COLUMNS_OF_VERSION = {1: _FIRST_COLUMNS, 2: _COLUMNS}
+# Which kinds there are is checked when rows are read: a new kind then needs no new schema.
+_TABLE = """CREATE TABLE {name} (
         id INTEGER PRIMARY KEY AUTOINCREMENT,
         at TEXT NOT NULL,
         who TEXT NOT NULL,
-        kind TEXT NOT NULL CHECK (kind IN ('label', 'accept', 'note', 'undo', 'redo')),
+        kind TEXT NOT NULL,
         object_id INTEGER NOT NULL,
         old_label INTEGER NOT NULL CHECK (old_label BETWEEN 0 AND 4),
         new_label INTEGER NOT NULL CHECK (new_label BETWEEN 0 AND 4),
         why TEXT NOT NULL,
-        target_id INTEGER REFERENCES events (id)
-    )""",
+        target_id INTEGER REFERENCES events (id),
+        details TEXT NOT NULL DEFAULT ''
+    )"""
+_TRIGGERS = (
     """CREATE TRIGGER events_are_never_changed BEFORE UPDATE ON events
         BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END""",
     """CREATE TRIGGER events_are_never_removed BEFORE DELETE ON events
         BEGIN SELECT RAISE(ABORT, 'the journal is append-only'); END""",
+)
+_SCHEMA = (
+    _TABLE.format(name="events"),
+    *_TRIGGERS,
     f"PRAGMA application_id = {APPLICATION_ID}",
+    f"PRAGMA user_version = {SCHEMA_VERSION}",
+)
+# A table's checks cannot be altered: the rows of version 1 are copied into a table of version 2.
+_FROM_VERSION_1 = (
+    _TABLE.format(name="events_2"),
+    f"INSERT INTO events_2 ({', '.join(_FIRST_COLUMNS)}) SELECT {', '.join(_FIRST_COLUMNS)} FROM events",
+    "DROP TABLE events",
+    "ALTER TABLE events_2 RENAME TO events",
+    *_TRIGGERS,
     f"PRAGMA user_version = {SCHEMA_VERSION}",
 )
 _MAGIC = b"SQLite format 3\0"
@@ -89,6 +107,16 @@ def create(path: Path, busy_timeout_s: float) -> None:
         raise StorageError(f"cannot write {path}: {error.strerror or error}") from None
 
 
+def migrate(connection: sqlite3.Connection) -> None:
+    """Bring a journal of an older schema up to this one, inside the caller's transaction: all or nothing.
+
+    Only writers do it: a journal that is merely looked at stays as it is.
+    """
+    if _version(connection) == 1:
+        for statement in _FROM_VERSION_1:
+            connection.execute(statement)
+
+
 def append(connection: sqlite3.Connection, event: Event) -> None:
     """Insert an event under the number it already carries; durable once the transaction commits."""
     connection.execute(
@@ -103,6 +131,7 @@ def append(connection: sqlite3.Connection, event: Event) -> None:
             int(event.new_label),
             event.why,
             event.target_id,
+            encode(event.groups),
         ),
     )
 
@@ -113,9 +142,9 @@ def read_events(connection: sqlite3.Connection, after: int) -> list[Event]:
     Raises:
         ResultError: a row holds what no event can hold.
     """
-    rows = connection.execute(
-        f"SELECT {', '.join(_COLUMNS)} FROM events WHERE id > ? ORDER BY id", (after,)
-    ).fetchall()
+    # All columns in one statement: another process may bring the schema up to date at any moment.
+    rows = connection.execute("SELECT * FROM events WHERE id > ? ORDER BY id", (after,)).fetchall()
+    rows = [row if len(row) == len(_COLUMNS) else (*row, "") for row in rows]
     try:
         return [
             Event(
@@ -128,8 +157,9 @@ def read_events(connection: sqlite3.Connection, after: int) -> list[Event]:
                 new_label=ChangeLabel(new_label),
                 why=str(why),
                 target_id=None if target_id is None else int(target_id),
+                groups=decode(str(details)),
             )
-            for number, at, who, kind, object_id, old_label, new_label, why, target_id in rows
+            for number, at, who, kind, object_id, old_label, new_label, why, target_id, details in rows
         ]
     except (TypeError, ValueError) as error:
         raise ResultError(f"the journal of decisions is damaged: {error}", _MOVE_AWAY) from None
@@ -147,6 +177,10 @@ def translated(path: Path, error: sqlite3.DatabaseError) -> OasisError:
     if code in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB):
         return ResultError(f"{path} is damaged ({error})", _MOVE_AWAY)
     return StorageError(f"cannot use {path}: {error}", "check the disk and the folder's permissions")
+
+
+def _version(connection: sqlite3.Connection) -> int:
+    return int(connection.execute("PRAGMA user_version").fetchone()[0])
 
 
 def _writable(path: Path) -> bool:
@@ -190,10 +224,11 @@ def _check_header(path: Path) -> None:
 
 
 def _check_content(path: Path, connection: sqlite3.Connection) -> None:
-    _check_version(path, connection.execute("PRAGMA user_version").fetchone()[0])
+    version = _version(connection)
+    _check_version(path, version)
     (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
     columns = tuple(row[1] for row in connection.execute("PRAGMA table_info(events)"))
-    if verdict != "ok" or columns != _COLUMNS:
+    if verdict != "ok" or columns != _COLUMNS_OF_VERSION.get(version):
         raise ResultError(f"{path} is damaged", _MOVE_AWAY)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from oasisview.review.fragments import Group
 from pipeline.errors import OasisError
 from pipeline.result import ChangeLabel
 
@@ -17,6 +18,16 @@ class Kind(StrEnum):
     NOTE = "note"  # wrote something down, no label
     UNDO = "undo"  # took back an own decision
     REDO = "redo"  # restored what was taken back
+    MERGE = "merge"  # said that several objects are pieces of one
+    SAME = "same"  # said that an object before and an object now are the same one
+    SPLIT = "split"  # said that what was one object is two or more
+    DROP = "drop"  # said that it is no object
+    KEEP = "keep"  # said that what was dropped is an object
+    RESTORE = "restore"  # went back to an earlier state
+
+
+CORRECTIONS = frozenset({Kind.MERGE, Kind.SAME, Kind.SPLIT, Kind.DROP, Kind.KEEP})
+DECISIONS = CORRECTIONS | {Kind.LABEL, Kind.ACCEPT, Kind.NOTE, Kind.RESTORE}
 
 
 @dataclass(frozen=True)
@@ -27,11 +38,14 @@ class Event:
         id: 1, 2, 3, ... without gaps, in the order in which they became durable.
         at: UTC, ISO 8601 with milliseconds.
         who: the person.
-        object_id: the object it is about.
+        object_id: the object it is about, by its number at that time; 0 for a restored state.
         old_label, new_label: final label of the object before and what this event says or, for undo and
             redo, restores; equal for notes.
         why: the person's reason; may be empty.
-        target_id: the decision that an undo or redo is about; else None.
+        target_id: the decision that an undo or redo is about, or the event after which the restored state
+            was; None for other kinds, and for the state before the first event.
+        groups: what a correction made of the fragments concerned; for a label of a corrected object that
+            object's fragments; empty for an object as the machine found it.
     """
 
     id: int
@@ -43,11 +57,15 @@ class Event:
     new_label: ChangeLabel
     why: str
     target_id: int | None
+    groups: tuple[Group, ...] = ()
 
 
 @dataclass(frozen=True)
 class Decision:
-    """A label, acceptance or note, and whether it was undone since; fields as in :class:`Event`."""
+    """Anything that a person did but undo and redo, and whether it counts; fields as in :class:`Event`.
+
+    ``undone``: it was taken back, by its author or by a restored earlier state.
+    """
 
     event_id: int
     at: str
@@ -58,6 +76,7 @@ class Decision:
     new_label: ChangeLabel
     why: str
     undone: bool
+    groups: tuple[Group, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -65,7 +84,8 @@ class FinalLabel:
     """What an object counts as after all decisions.
 
     Attributes:
-        overridden: a person's label stands and differs from the machine's.
+        overridden: a person's label stands and differs from the machine's, or the object itself is another
+            than the machine found.
         decided_by, decided_at, why: of the standing decision; None where nobody decided.
         event_id: the standing decision; None where nobody decided.
     """
@@ -87,7 +107,19 @@ class ConflictError(OasisError):
 
     def __init__(self, event: Event) -> None:
         self.event = event
-        did = f"set object {event.object_id} to {event.new_label.name.lower()}"
         super().__init__(
-            f"{event.who} {did} at {event.at[11:16]} UTC, after you looked", "look again, then decide"
+            f"{event.who} {_did(event)} at {event.at[11:16]} UTC, after you looked",
+            "look again, then decide",
         )
+
+
+def _did(event: Event) -> str:
+    number = event.object_id
+    return {
+        Kind.MERGE: f"merged object {number} with others",
+        Kind.SAME: f"said that object {number} is the same as another",
+        Kind.SPLIT: f"split object {number}",
+        Kind.DROP: f"said that object {number} is not an object",
+        Kind.KEEP: f"said that object {number} is an object",
+        Kind.RESTORE: "went back to an earlier state",
+    }.get(event.kind, f"set object {number} to {event.new_label.name.lower()}")

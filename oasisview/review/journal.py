@@ -9,81 +9,33 @@ the disk.
 
 from __future__ import annotations
 
-import sqlite3
-import threading
-import unicodedata
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
-from pathlib import Path
-from types import TracebackType
-from typing import TypeVar
 
 from oasisview.review import database
-from oasisview.review.events import ConflictError, Decision, Event, FinalLabel, Kind
-from oasisview.review.replay import Replay
-from pipeline.errors import InputError, ResultError
+from oasisview.review.corrected_map import CorrectedMap, CorrectedObject
+from oasisview.review.corrected_result import CorrectedResult
+from oasisview.review.events import CORRECTIONS, ConflictError, Decision, Event, FinalLabel, Kind
+from oasisview.review.fragments import Group, Members, all_members
+from oasisview.review.journal_file import JournalFile
+from oasisview.review.machine_map import MachineMap
+from oasisview.review.people import checked_name, checked_reason, one_line
+from oasisview.review.replay import Change, Replay
+from pipeline.errors import InputError
 from pipeline.result import ChangeLabel, Result
 
 REVIEW_FILE = "review.sqlite"
-MAX_WHO_LENGTH = 80
-MAX_WHY_LENGTH = 500
-BUSY_TIMEOUT_S = 10.0
-
-# Bidirectional overrides: a name or reason must not be able to turn the text around it.
-_BIDIRECTIONAL = frozenset("\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
-_Returned = TypeVar("_Returned")
 
 
-class Journal:
+class Journal(JournalFile):
     """All decisions about one result. The file is made with the first decision, not before."""
-
-    def __init__(
-        self,
-        path: str | Path,
-        machine: Mapping[int, ChangeLabel],
-        *,
-        busy_timeout_s: float = BUSY_TIMEOUT_S,
-    ) -> None:
-        """Open the journal at ``path``, or get ready to make it.
-
-        Args:
-            path: ``review.sqlite`` in the result folder.
-            machine: the machine's label of every object of the result, by object id.
-            busy_timeout_s: how long to wait for another process that is writing.
-
-        Raises:
-            ResultError: the file is damaged, foreign or of a newer schema; it stays as it is.
-        """
-        self.path = Path(path)
-        self._machine = dict(machine)
-        self._busy_timeout_s = busy_timeout_s
-        self._lock = threading.RLock()
-        self._replay = Replay()
-        self._connection: sqlite3.Connection | None = None
-        self._inode: tuple[int, int] | None = None
-        with self._lock:
-            self._follow()
 
     @classmethod
     def of(cls, result: Result) -> Journal:
         """The journal of a result."""
-        return cls(result.path / REVIEW_FILE, {item.object_id: item.label for item in result.objects})
-
-    def __enter__(self) -> Journal:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Let go of the file; a later call opens it again."""
-        with self._lock:
-            if self._connection is not None:
-                self._connection.close()
-            self._connection = None
+        machine = result.machine if isinstance(result, CorrectedResult) else result
+        return cls(result.path / REVIEW_FILE, MachineMap.of(machine))
 
     # What people do
 
@@ -114,12 +66,83 @@ class Journal:
         self, object_id: int, *, who: str, why: str = "", expected_event_id: int | None = None
     ) -> Decision:
         """Confirm the machine's label of an object; raises like :meth:`decide`."""
-        label = self._machine.get(object_id, ChangeLabel.UNKNOWN)
+        entry = self.corrected().objects.get(object_id)
+        label = entry.item.label if entry is not None else ChangeLabel.UNKNOWN
         return self._decide(Kind.ACCEPT, object_id, label, who, why, expected_event_id)
+
+    def correct(
+        self,
+        kind: Kind,
+        object_id: int,
+        groups: Sequence[Group],
+        *,
+        who: str,
+        why: str = "",
+        expected_event_id: int | None = None,
+    ) -> Decision:
+        """Say which fragments are one object, or none (``oasisview.review.corrections`` makes the groups).
+
+        Args:
+            kind: one of ``CORRECTIONS``.
+            object_id: the object that it is mainly about, by its present number.
+            groups: what becomes of the fragments concerned; no fragment twice.
+
+        Raises:
+            ConflictError: somebody else decided on any object concerned after ``expected_event_id``.
+            InputError: no such fragments, no name, or too long a reason.
+            StorageError: it could not be saved; the journal is unchanged.
+        """
+        who, why = checked_name(who), checked_reason(why)
+        members = all_members(groups)
+        if kind not in CORRECTIONS or not members or sum(len(g.members) for g in groups) != len(members):
+            raise InputError("that is no correction", "name every part of the objects concerned once")
+        if not members <= self._machine.number_of.keys():
+            raise InputError("the result has no such parts of objects", "choose objects of this result")
+        with self._transaction() as connection:
+            self._check_unchanged(members, who, expected_event_id)
+            before = self._replay.state()
+            event = self._event(who, kind, object_id, ChangeLabel.UNKNOWN, ChangeLabel.UNKNOWN, why, None)
+            event = replace(event, groups=tuple(groups))
+            after = self._replay.state_with(event)
+            event = replace(
+                event,
+                old_label=_label_in(before, members, object_id),
+                new_label=_label_in(after, groups[0].members, object_id),
+            )
+            database.append(connection, event)
+        return self._written(event.id)
+
+    def restore(
+        self, event_id: int, *, who: str, why: str = "", expected_event_id: int | None = None
+    ) -> Decision | None:
+        """Go back to the state after an event, 0 = to what the machine found; None if it is that state.
+
+        Everybody's decisions since then end to count, and those that were taken back since count again;
+        nothing is erased, and undo brings it all back.
+
+        Raises:
+            ConflictError: somebody else did anything after ``expected_event_id``.
+            InputError: there is no such event, no name, or too long a reason.
+            StorageError: it could not be saved; the journal is unchanged.
+        """
+        who, why = checked_name(who), checked_reason(why)
+        if not 0 <= event_id <= self.last_event_id:
+            raise InputError(f"the journal has no entry {event_id}", "choose an entry of the list")
+        if self.restoring(event_id) == Change(frozenset(), frozenset()):
+            return None
+        with self._transaction() as connection:
+            if expected_event_id is not None:
+                others = [e for e in self._replay.events[expected_event_id:] if e.who != who]
+                if others:
+                    raise ConflictError(others[-1])
+            unknown = ChangeLabel.UNKNOWN
+            event = self._event(who, Kind.RESTORE, 0, unknown, unknown, why, event_id or None)
+            database.append(connection, event)
+        return self._written(event.id)
 
     def note(self, object_id: int, text: str, *, who: str) -> Decision:
         """Write something down about an object without deciding; raises like :meth:`decide`."""
-        if not _cleaned(text):
+        if not one_line(text):
             raise InputError("the note is empty", "write at least a word")
         return self._decide(Kind.NOTE, object_id, None, who, text, None)
 
@@ -135,11 +158,11 @@ class Journal:
 
     def can_undo(self, who: str) -> bool:
         """Whether undo would do something."""
-        return self._asked(lambda replay: replay.undoable(_name(who)) is not None)
+        return self._asked(lambda replay: replay.undoable(checked_name(who)) is not None)
 
     def can_redo(self, who: str) -> bool:
         """Whether redo would do something."""
-        return self._asked(lambda replay: replay.redoable(_name(who)) is not None)
+        return self._asked(lambda replay: replay.redoable(checked_name(who)) is not None)
 
     @property
     def last_event_id(self) -> int:
@@ -150,9 +173,37 @@ class Journal:
         """All labels, acceptances and notes, undone ones included, in the order they were made."""
         return self._asked(Replay.decisions)
 
-    def final_labels(self, machine: Mapping[int, ChangeLabel] | None = None) -> dict[int, FinalLabel]:
-        """Final label of every object; ``machine`` = the machine's labels if not those of the result."""
-        return self._asked(lambda replay: replay.final_labels(self._machine if machine is None else machine))
+    def corrected(self) -> CorrectedMap:
+        """The map with all decisions applied."""
+        return self._asked(Replay.state)
+
+    def final_labels(self) -> dict[int, FinalLabel]:
+        """Final label of every object of the corrected map."""
+        return {number: entry.final for number, entry in self.corrected().objects.items()}
+
+    def preview(self, kind: Kind, object_id: int, groups: Sequence[Group]) -> CorrectedMap:
+        """The map that a correction would give; nothing is written."""
+        unknown = ChangeLabel.UNKNOWN
+
+        def imagine(replay: Replay) -> CorrectedMap:
+            event = Event(
+                replay.last_event_id + 1, "", "", kind, object_id, unknown, unknown, "", None, tuple(groups)
+            )
+            return replay.state_with(event)
+
+        return self._asked(imagine)
+
+    def restoring(self, event_id: int) -> Change:
+        """Which decisions :meth:`restore` would take away and bring back."""
+        return self._asked(lambda replay: replay.restoring(event_id))
+
+    def undoable(self, who: str) -> Event | None:
+        """What undo would take back."""
+        return self._asked(lambda replay: replay.undoable(checked_name(who)))
+
+    def fragments_of(self, event: Event) -> Members:
+        """The fragments that an event changes something about."""
+        return self._asked(lambda replay: replay.concerned_by(event))
 
     def changes_since(self, event_id: int) -> tuple[Event, ...]:
         """Events after ``event_id`` (0 = all), those of other processes included."""
@@ -169,24 +220,21 @@ class Journal:
         why: str,
         expected_event_id: int | None,
     ) -> Decision:
-        who, why = _name(who), _reason(why)
-        if object_id not in self._machine:
-            raise InputError(f"the result has no object {object_id}", "choose an object of this result")
+        who, why = checked_name(who), checked_reason(why)
+        self._asked(lambda replay: _entry(replay, object_id))  # refused before a file is made for it
         with self._transaction() as connection:
-            if expected_event_id is not None:
-                other = self._replay.latest_by_others(object_id, who)
-                if other is not None and other.id > expected_event_id:
-                    raise ConflictError(other)
-            old = self._label_of(object_id)
+            entry = _entry(self._replay, object_id)
+            self._check_unchanged(entry.members, who, expected_event_id)
+            old = entry.final.label
             new = old if label is None else label
             event = self._event(who, kind, int(object_id), old, new, why, None)
+            if self._machine.members.get(object_id) != entry.members:
+                event = replace(event, groups=(Group(entry.members),))
             database.append(connection, event)
-        with self._lock:
-            self._follow()
-            return self._replay.decision(event.id)
+        return self._written(event.id)
 
     def _turn(self, kind: Kind, who: str) -> Decision | None:
-        who = _name(who)
+        who = checked_name(who)
         if not (self.can_undo(who) if kind is Kind.UNDO else self.can_redo(who)):
             return None
         with self._transaction() as connection:
@@ -194,15 +242,24 @@ class Journal:
             target = self._replay.undoable(who) if undo else self._replay.redoable(who)
             if target is None:  # the same person did it in another window meanwhile
                 return None
-            old = self._label_of(target.object_id)
-            new = self._label_of(
-                target.object_id, without=target.id if undo else 0, restored=0 if undo else target.id
-            )
+            members = self._replay.fragments(target)
+            old = _label_in(self._replay.state(), members, target.object_id)
+            new = _label_in(self._replay.state_if_turned(target, stands=not undo), members, target.object_id)
             event = self._event(who, kind, target.object_id, old, new, "", target.id)
             database.append(connection, event)
+        return self._written(target.id)
+
+    def _check_unchanged(self, members: Members, who: str, expected_event_id: int | None) -> None:
+        if expected_event_id is None:
+            return
+        other = self._replay.latest_by_others(members, who)
+        if other is not None and other.id > expected_event_id:
+            raise ConflictError(other)
+
+    def _written(self, event_id: int) -> Decision:
         with self._lock:
             self._follow()
-            return self._replay.decision(target.id)
+            return self._replay.decision(event_id)
 
     def _event(
         self,
@@ -217,69 +274,6 @@ class Journal:
         at = datetime.now(UTC).isoformat(timespec="milliseconds")
         return Event(self._replay.last_event_id + 1, at, who, kind, object_id, old, new, why, target_id)
 
-    def _label_of(self, object_id: int, *, without: int = 0, restored: int = 0) -> ChangeLabel:
-        event = self._replay.standing(object_id, without=without, restored=restored)
-        if event is not None:
-            return event.new_label
-        return self._machine.get(object_id, ChangeLabel.UNKNOWN)
-
-    @contextmanager
-    def _transaction(self) -> Iterator[sqlite3.Connection]:
-        """The only writer of all processes, with every earlier event replayed."""
-        with self._lock:
-            if self._connection is None and not database.exists(self.path):
-                database.create(self.path, self._busy_timeout_s)
-            self._follow()
-            connection = self._connection
-            assert connection is not None
-            self._check_in_place()
-            try:
-                connection.execute("BEGIN IMMEDIATE")
-                try:
-                    self._follow()
-                    yield connection
-                    connection.execute("COMMIT")
-                except BaseException:
-                    if connection.in_transaction:
-                        connection.execute("ROLLBACK")
-                    raise
-            except sqlite3.DatabaseError as error:
-                raise database.translated(self.path, error) from None
-
-    def _follow(self) -> None:
-        """Replay what this or another process has written since; the lock is held."""
-        if self._connection is None:
-            if not database.exists(self.path):
-                return
-            self._connection = database.open_existing(self.path, self._busy_timeout_s)
-            self._inode = self._inode_on_disk()
-            self._replay = Replay()
-        try:
-            events = database.read_events(self._connection, self._replay.last_event_id)
-        except sqlite3.DatabaseError as error:
-            raise database.translated(self.path, error) from None
-        for event in events:
-            self._replay.apply(event)
-
-    def _check_in_place(self) -> None:
-        """Refuse to write into a file that nobody will find again and call that saved."""
-        if self._inode_on_disk() != self._inode:
-            raise ResultError(
-                f"{self.path} was replaced or removed since it was opened", "close and open the result again"
-            )
-
-    def _inode_on_disk(self) -> tuple[int, int] | None:
-        try:
-            status = self.path.stat()
-        except OSError:
-            return None
-        return status.st_dev, status.st_ino
-
-    def _asked(self, question: Callable[[Replay], _Returned]) -> _Returned:
-        with self._lock:
-            self._follow()
-            return question(self._replay)
-
 
 def _label(label: ChangeLabel | int) -> ChangeLabel:
     try:
@@ -288,32 +282,18 @@ def _label(label: ChangeLabel | int) -> ChangeLabel:
         raise InputError(f"there is no label {label!r}", "labels are 0 to 4") from None
 
 
-def _name(who: str) -> str:
-    name = _cleaned(who)
-    if not name:
-        raise InputError("a decision needs the name of who decides", "say who you are")
-    if len(name) > MAX_WHO_LENGTH:
-        raise InputError(
-            f"the name is {len(name)} characters long", f"use at most {MAX_WHO_LENGTH} characters"
-        )
-    return name
+def _entry(replay: Replay, object_id: int) -> CorrectedObject:
+    entry = replay.state().objects.get(object_id)
+    if entry is None:
+        raise InputError(f"the result has no object {object_id}", "choose an object of this result")
+    return entry
 
 
-def _reason(why: str) -> str:
-    reason = _cleaned(why)
-    if len(reason) > MAX_WHY_LENGTH:
-        raise InputError(
-            f"the reason is {len(reason)} characters long", f"use at most {MAX_WHY_LENGTH} characters"
-        )
-    return reason
-
-
-def _cleaned(text: str) -> str:
-    """One line of printable text: line breaks become spaces, control characters and lone surrogates go."""
-    spaced = "".join(" " if character.isspace() else character for character in text)
-    kept = (
-        character
-        for character in spaced
-        if unicodedata.category(character) not in ("Cc", "Cs") and character not in _BIDIRECTIONAL
-    )
-    return " ".join("".join(kept).split())
+def _label_in(state: CorrectedMap, members: Members, object_id: int) -> ChangeLabel:
+    """The label of what an event is about: its object if it is there, else the one of its first fragment."""
+    if object_id not in state.objects or not state.objects[object_id].members & members:
+        numbers = sorted(state.concerned(members))
+        if not numbers:  # no object any more: background, which is static
+            return ChangeLabel.STATIC if members else ChangeLabel.UNKNOWN
+        object_id = numbers[0]
+    return state.objects[object_id].final.label

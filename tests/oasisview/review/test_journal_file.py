@@ -47,7 +47,7 @@ def refused(path: Path, message: str) -> None:
 def test_settings_of_the_file(path: Path) -> None:
     with closing(sqlite3.connect(path)) as connection:
         assert connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
-        assert connection.execute("PRAGMA user_version").fetchone() == (1,)
+        assert connection.execute("PRAGMA user_version").fetchone() == (2,)
     with Journal(path, MACHINE) as journal:
         assert journal._connection is not None
         assert journal._connection.execute("PRAGMA synchronous").fetchone() == (2,)
@@ -71,8 +71,8 @@ def test_database_of_another_program_is_refused(tmp_path: Path) -> None:
 
 
 def test_newer_schema_is_refused(path: Path) -> None:
-    edit(path, "PRAGMA user_version = 2")
-    refused(path, "newer oasisview .schema 2")
+    edit(path, "PRAGMA user_version = 3")
+    refused(path, "newer oasisview .schema 3")
 
 
 def test_newer_schema_still_in_the_write_ahead_log_is_refused(path: Path) -> None:
@@ -99,7 +99,7 @@ def test_removed_row_is_noticed(path: Path) -> None:
 
 
 def test_forged_undo_is_noticed(path: Path) -> None:
-    edit(path, "INSERT INTO events VALUES (7, '2026', 'ben', 'undo', 1, 0, 0, '', 6)")
+    edit(path, "INSERT INTO events VALUES (7, '2026', 'ben', 'undo', 1, 0, 0, '', 6, '')")
     refused(path, "event 7 does not follow")
 
 
