@@ -123,6 +123,11 @@ class Replay:
 
     def _count(self, decision: Event, *, stands: bool, told_by: Event | None = None) -> None:
         change = self._change_of(decision, stands=stands)
+        if decision.kind is Kind.RESTORE:
+            # What was really changed: others may have turned some of it meanwhile, and that is theirs.
+            own = frozenset({decision.id})
+            brought, taken = (change.brought, change.taken) if stands else (change.taken, change.brought)
+            self._restored[decision.id] = Change(brought - own, taken)
         self._standing.difference_update(change.taken)
         self._standing.update(change.brought)
         self._changes.append(change)
