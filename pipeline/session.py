@@ -45,6 +45,21 @@ class Frame:
 
 
 @dataclass(frozen=True)
+class GeographicOrigin:
+    """Where on Earth the world frame stands: its z axis is up there.
+
+    Attributes:
+        latitude_deg, longitude_deg: WGS 84; altitude_m: above its ellipsoid.
+        y_axis_azimuth_deg: direction of the world's y axis, clockwise from north.
+    """
+
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float = 0.0
+    y_axis_azimuth_deg: float = 0.0
+
+
+@dataclass(frozen=True)
 class Session:
     """One visit: posed frames in a metric world frame shared by the visits that are compared.
 
@@ -59,6 +74,7 @@ class Session:
         metadata_files: files besides the frames' that define the session, for hashing.
         warnings: one finished line each about what was left out or repaired.
         frames_left_out: how many frames of the archive are not in ``frames``.
+        origin: where on Earth the world frame stands, or None.
     """
 
     name: str
@@ -71,3 +87,4 @@ class Session:
     metadata_files: tuple[Path, ...] = ()
     warnings: tuple[str, ...] = ()
     frames_left_out: int = 0
+    origin: GeographicOrigin | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import tempfile
 import time
@@ -356,6 +357,7 @@ class _Run:
                     "frames": len(session.frames),
                     "keyframes": len(visits[visit].geometry.keyframes),
                     "captured_at": session.captured_at,
+                    **({"origin": dataclasses.asdict(session.origin)} if session.origin else {}),
                 }
                 for visit, session in enumerate(self._sessions)
             ],

@@ -15,13 +15,16 @@ they did, else the machine's, which is kept beside them."""
 # Names and meanings as in oasisview.export.FORMATS, which a test holds them to: importing that here would
 # make every command slower.
 FORMATS = {
-    "ply": "points of all visits with label, object and confidence",
+    "report": "one HTML page to read or print: plan, pictures and evidence of every change",
     "csv": "one row per object with labels, evidence and decisions, for spreadsheets",
     "json": "one row per object with labels, evidence and decisions",
+    "geojson": "footprint polygon of every object with label, displacement and confidence, for maps",
+    "ply": "points of all visits with label, object and confidence",
+    "laz": "points of all visits as compressed LAS 1.4 with session, label, object_id, confidence",
+    "glb": "3D scene (glTF 2.0): one named mesh per object and visit, coloured by label",
     "heatmaps": "folder of semantic and geometric heatmaps of every keyframe (TIFF and PNG)",
-    "report": "one HTML page to read or print: plan, pictures and evidence of every change",
+    "coco": "COCO instance JSON: masks of the final labels in every keyframe (RLE)",
 }
-LATER_FORMATS = ("laz", "glb", "geojson", "coco")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -39,8 +42,7 @@ def run_command(arguments: argparse.Namespace) -> int:
     """Export and name what was written."""
     chosen = arguments.format
     if chosen not in FORMATS:
-        what = "is not in this version" if chosen in LATER_FORMATS else "does not exist"
-        raise InputError(f"export format {chosen} {what}", f"choose {', '.join(FORMATS)}")
+        raise InputError(f"there is no export format {chosen!r}", f"choose one of {', '.join(FORMATS)}")
     from oasisview.console import ConsoleProgress
     from oasisview.export import export
     from pipeline.store import read_manifest

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-from oasisview.export.exporter import ReviewedResult, Steps, point_chunks
+from oasisview.export.exporter import ReviewedResult, Steps
+from oasisview.export.object_points import object_parts
 from oasisview.scene.viewpoints import horizontal_axes
 from pipeline.result import Result
 
@@ -66,20 +67,12 @@ def footprints(
     """Footprint of every sighting by (object id, visit); of its bounds where the map has no point of it."""
     outlines: dict[tuple[int, int], NDArray[np.float64]] = {}
     heights: dict[tuple[int, int], tuple[float, float]] = {}
-    for session, chosen in point_chunks(reviewed):
-        ids = reviewed.object_ids(session, chosen)
-        on_object = np.flatnonzero(ids > 0)
-        by_object = on_object[np.argsort(ids[on_object], kind="stable")]
-        points = plan.project(session.points_world[chosen][by_object])
-        found, starts = np.unique(ids[by_object], return_index=True)
-        for object_id, part in zip(found.tolist(), np.split(points, starts[1:]), strict=True):
-            key = (object_id, session.index)
-            earlier = outlines.get(key, np.zeros((0, 2)))
-            outlines[key] = _outline(np.concatenate([earlier, part[:, :2]]))
-            low, high = heights.get(key, (np.inf, -np.inf))
-            heights[key] = (min(low, float(part[:, 2].min())), max(high, float(part[:, 2].max())))
-        if steps is not None:
-            steps.step()
+    for (session_index, object_id), part in object_parts(reviewed, steps):
+        key, points = (object_id, session_index), plan.project(part)
+        earlier = outlines.get(key, np.zeros((0, 2)))
+        outlines[key] = _outline(np.concatenate([earlier, points[:, :2]]))
+        low, high = heights.get(key, (np.inf, -np.inf))
+        heights[key] = (min(low, float(points[:, 2].min())), max(high, float(points[:, 2].max())))
     found_footprints = {key: Footprint(outline, *heights[key]) for key, outline in outlines.items()}
     for item in reviewed.objects:
         for sighting in item.sightings:

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from oasisview.export.coco_masks import CocoExporter
 from oasisview.export.exporter import Exporter, ReviewedResult
+from oasisview.export.geojson_objects import GeoJsonExporter
+from oasisview.export.glb_scene import GlbExporter
 from oasisview.export.heatmaps import HeatmapExporter
+from oasisview.export.laz_points import LazExporter
 from oasisview.export.ply_points import PlyExporter
 from oasisview.export.report import ReportExporter
 from oasisview.export.tables import CsvExporter, JsonExporter
@@ -15,7 +19,17 @@ from pipeline.store import open_result
 
 FORMATS: dict[str, Exporter] = {
     exporter.name: exporter
-    for exporter in (PlyExporter(), CsvExporter(), JsonExporter(), HeatmapExporter(), ReportExporter())
+    for exporter in (
+        ReportExporter(),
+        CsvExporter(),
+        JsonExporter(),
+        GeoJsonExporter(),
+        PlyExporter(),
+        LazExporter(),
+        GlbExporter(),
+        HeatmapExporter(),
+        CocoExporter(),
+    )
 }
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pipeline.errors import InputError
 from pipeline.readers.filetree import FileTree
-from pipeline.session import DepthSource, Frame, Session
+from pipeline.session import DepthSource, Frame, GeographicOrigin, Session
 
 MIN_FRAMES = 2
 NAMED_PER_REASON = 10  # so that an archive without any depth does not print a thousand lines
@@ -45,6 +45,7 @@ class FrameCollector:
         depth_source: DepthSource = "sensor",
         captured_at: str | None = None,
         path: Path | None = None,
+        origin: GeographicOrigin | None = None,
     ) -> Session:
         """The finished session, after a look at its first images; unnamed visits are called as their archive.
 
@@ -68,6 +69,7 @@ class FrameCollector:
             metadata_files=self.tree.sources(*metadata),
             warnings=tuple(self.warnings),
             frames_left_out=sum(len(names) for names in self._left_out.values()),
+            origin=origin,
         )
 
     def probe(self) -> Frame | None:

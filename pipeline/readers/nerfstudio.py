@@ -12,6 +12,7 @@ from pipeline.errors import InputError
 from pipeline.readers.assembly import FrameCollector
 from pipeline.readers.filetree import FileTree, normalised
 from pipeline.readers.intrinsics import Distortion, checked_camera, number
+from pipeline.readers.origin import read_origin
 from pipeline.readers.poses import checked_pose, opencv_from_opengl
 from pipeline.readers.stored import StoredImages
 from pipeline.session import DepthSource, Frame, Session
@@ -72,6 +73,7 @@ class NerfstudioReader:
             metadata=metadata,
             depth_source=about.get("depth_source", "sensor"),
             captured_at=about.get("captured_at"),
+            origin=read_origin(about, collector),
         )
 
     def _add(

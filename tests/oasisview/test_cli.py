@@ -116,12 +116,9 @@ def test_runs_as_a_module() -> None:
             "oasisview demo: argument --port: many is not a port (1 to 65535): see `oasisview demo --help`",
         ),
         (
-            ["export", "gone.oasis", "--format", "laz", "-o", "x"],
-            "oasisview: export format laz is not in this version: choose ply, csv, json, heatmaps, report",
-        ),
-        (
             ["export", "gone.oasis", "--format", "docx", "-o", "x"],
-            "oasisview: export format docx does not exist: choose ply, csv, json, heatmaps, report",
+            "oasisview: there is no export format 'docx': choose one of report, csv, json, geojson, ply, "
+            "laz, glb, heatmaps, coco",
         ),
         (
             ["export", "gone.oasis", "--format", "ply", "-o", "x"],

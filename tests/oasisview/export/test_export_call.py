@@ -17,7 +17,17 @@ from pipeline.errors import InputError, ResultError, StorageError
 
 def test_formats_are_those_of_the_contract() -> None:
     suffixes = {name: exporter.suffix for name, exporter in FORMATS.items()}
-    assert suffixes == {"ply": ".ply", "csv": ".csv", "json": ".json", "heatmaps": "", "report": ".html"}
+    assert suffixes == {
+        "report": ".html",
+        "csv": ".csv",
+        "json": ".json",
+        "geojson": ".geojson",
+        "ply": ".ply",
+        "laz": ".laz",
+        "glb": ".glb",
+        "heatmaps": "",
+        "coco": ".json",
+    }
 
 
 def test_the_commands_help_says_what_the_formats_are() -> None:
@@ -25,7 +35,7 @@ def test_the_commands_help_says_what_the_formats_are() -> None:
 
 
 def test_unknown_format_lists_the_others(small_result_path: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"'xls': choose one of ply, csv, json, heatmaps, "):
+    with pytest.raises(InputError, match=r"'xls': choose one of report, csv, json, "):
         export(small_result_path, "xls", tmp_path / "map.xls")
 
 
@@ -36,7 +46,7 @@ def test_missing_result_writes_nothing(tmp_path: Path, format: str) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("format", ["ply", "csv", "json"])
+@pytest.mark.parametrize("format", ["ply", "csv", "json", "geojson", "laz", "glb", "coco"])
 def test_a_file_is_replaced_and_a_folder_is_not(small_result_path: Path, tmp_path: Path, format: str) -> None:
     out = tmp_path / "map"
     out.write_text("an earlier export")
