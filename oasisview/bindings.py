@@ -9,7 +9,6 @@ from oasisview import events
 from oasisview.panels import queue
 from oasisview.panels.export import DOWNLOADS
 from oasisview.panels.hud import COLOURS, LAYER_WORDS, MODES
-from oasisview.panels.matrix import KINDS
 from oasisview.shell import Shell
 from oasisview.wording import LABEL_NAMES, LABEL_OF_NAME
 
@@ -25,6 +24,8 @@ def bind(inspector: Inspector, shell: Shell) -> None:
     _bind_decisions(inspector, shell)
     _bind_map(inspector, shell)
     _bind_keyframes(inspector, shell)
+    inspector.matrix.bind()
+    inspector.what_if.bind()
     _add_commands(inspector, shell)
 
 
@@ -34,9 +35,6 @@ def _bind_selection(inspector: Inspector, shell: Shell) -> None:
     on("pixel", inspector.click_picture, events.pixel_click)
     on("filter", inspector.toggle_filter, events.choice(*LABEL_OF_NAME))
     on("swipe", lambda _: inspector.toggle_swipe())
-    on("matrix", inspector.click_matrix, events.pixel_click)
-    on("matrix_cell", inspector.show_pair, events.record(before=events.object_id, after=events.object_id))
-    on("matrix_kind", inspector.set_matrix_kind, events.choice(*KINDS))
     on("export", inspector.download, events.choice(*(d.format for d in DOWNLOADS)))
 
 

@@ -18,14 +18,16 @@ from oasisview.bindings import bind
 from oasisview.crops import object_at
 from oasisview.downloads import make_download
 from oasisview.map_controls import MapControls
+from oasisview.matrix_actions import MatrixActions
 from oasisview.page import Choices, Page
 from oasisview.panels import queue
 from oasisview.panels.export import DOWNLOADS
-from oasisview.panels.matrix import cell_at, cell_of
+from oasisview.preview import Preview
 from oasisview.scene.map_points import LABEL_RGB
 from oasisview.scene.map_view import PAST_LABELS, MapView
 from oasisview.shell import Shell
 from oasisview.verdict_actions import VerdictActions
+from oasisview.what_if_actions import WhatIfActions
 from oasisview.wording import LABEL_OF_NAME
 from oasisview.workbench import Workbench
 from pipeline.errors import OasisError
@@ -70,6 +72,9 @@ class Inspector:
             on_keyframe=self.show_keyframe,
         )
         self.controls = MapControls(shell, self._page, bench, self._map, self._lock, self._show_band)
+        self.matrix = MatrixActions(shell, self._page, bench, self._lock)
+        self.preview = Preview(shell, self._page, self._map, self._lock)
+        self.what_if = WhatIfActions(shell, self._page, bench, self.preview, self._lock)
 
     @property
     def client_id(self) -> int:
@@ -98,6 +103,7 @@ class Inspector:
             self._page.show_queue()
             self._page.show_journal()
             self._page.show_export()
+            self.what_if.open()
             wanted = hello.object_id if hello is not None else None
             if wanted in self._catalogue.objects:
                 # A keyframe in the address was being looked at together with the object.
@@ -134,8 +140,7 @@ class Inspector:
                 return
             choices = self.choices
             choices.selected, choices.conflict = item.object_id, ""
-            if not self._picked_pair_shows(item.object_id):
-                choices.cell = None
+            self.matrix.forget_pair_without(item.object_id)
             self._show_where_visible(item)
             if not keep_keyframe:
                 self._choose_keyframe(item)
@@ -146,13 +151,6 @@ class Inspector:
             if fly:
                 self.controls.fly_selected()
             self._page.show_matrix()
-
-    def _picked_pair_shows(self, object_id: int) -> bool:
-        matrix, cell = self._catalogue.result.score_matrix, self.choices.cell
-        return cell is not None and object_id in (
-            matrix.row_object_ids[cell[0]],
-            matrix.column_object_ids[cell[1]],
-        )
 
     def step(self, by: int) -> None:
         """Select the object ``by`` rows further down the queue."""
@@ -246,6 +244,7 @@ class Inspector:
             self._map.recolour()
             self._page.show_journal()
             self._page.show_export()
+            self.what_if.follow()
             if self.choices.selected is not None:
                 self._page.show_evidence()
                 if self.choices.selected in changed:
@@ -282,24 +281,6 @@ class Inspector:
         with self._lock:
             self.choices.swipe = not self.choices.swipe
             self._page.show_evidence()
-
-    def set_matrix_kind(self, kind: str) -> None:
-        """Which numbers the matrix shows."""
-        with self._lock:
-            self.choices.matrix_kind = kind
-            self._page.show_matrix()
-
-    def click_matrix(self, click: events.PixelClick) -> None:
-        """Show the pair under a click in the picture of the whole matrix."""
-        with self._lock:
-            self.choices.cell = cell_at(self._catalogue.result.score_matrix.sigma.shape, click.u, click.v)
-            self._page.show_matrix()
-
-    def show_pair(self, pair: dict[str, int]) -> None:
-        """Show a pair of objects of the matrix, before and after."""
-        with self._lock:
-            self.choices.cell = cell_of(self._catalogue.result.score_matrix, pair["before"], pair["after"])
-            self._page.show_matrix()
 
     def _show_band(self, *, whole: bool = False) -> None:
         self._page.show_band(whole=whole)

@@ -17,7 +17,9 @@ from oasisview.panels.export import export_html
 from oasisview.panels.hud import Layers, hud_html, legend_html, who_html
 from oasisview.panels.journal import journal_html
 from oasisview.panels.matrix import matrix_html
+from oasisview.panels.preview import preview_html
 from oasisview.shell import Shell
+from oasisview.what_if_panel import WhatIfPanel
 from oasisview.workbench import Workbench
 from pipeline.result import ChangeLabel
 
@@ -38,6 +40,7 @@ class Choices:
     swipe: bool = False
     matrix_kind: str = "sigma"
     cell: tuple[int, int] | None = None
+    preview: str = ""  # what the map's colours stand for while they are not the decided labels
     pending_label: tuple[int, ChangeLabel] | None = None
     conflict: str = ""
     export_status: str = ""
@@ -75,6 +78,7 @@ class Page:
         tabs = gui.add_tab_group()
         with tabs.add_tab("Queue"):
             self._queue = gui.add_html("")
+        self.what_if = WhatIfPanel(gui, tabs.add_tab("What-if"))
         with tabs.add_tab("Journal"):
             self._journal = gui.add_html("")
         with tabs.add_tab("Export"):
@@ -83,9 +87,8 @@ class Page:
     def show_hud(self) -> None:
         """Switches and legend over the map."""
         choices = self.choices
-        self._shell.set_html(
-            "hud", hud_html(choices.mode, choices.colours, choices.layers, dark=choices.dark)
-        )
+        hud = hud_html(choices.mode, choices.colours, choices.layers, dark=choices.dark)
+        self._shell.set_html("hud", hud + preview_html(choices.preview))
         self._shell.set_html("legend", legend_html(choices.colours, choices.mode))
 
     def show_who(self) -> None:

@@ -33,6 +33,14 @@ REASON_HINT = "Your reason is kept with your name and the time, and goes into th
 NO_DECISIONS = "No decisions yet. Press Enter to accept a label, or 1 to 5 to set another one."
 NO_SHARED_VIEW = "No keyframe of the other visit shows this view."
 NO_OBJECTS = "No objects were found in these visits, so there is nothing to review."
+NO_WHAT_IF = (
+    "This result does not hold what its labels follow from, so other limits cannot be tried: it was made by "
+    "an earlier version or by a baseline. Process the visits again to try them."
+)
+NO_OVERLAP = (
+    "This result was decided by matches alone: what was seen at each place was not compared. Process the "
+    "visits again with --set change.rule=evidence."
+)
 NOTHING_IN_QUEUE = "Nothing to show: every label is switched off above. Click a label to show it."
 
 

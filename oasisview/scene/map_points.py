@@ -155,12 +155,15 @@ def object_colours(
     colours_rgb: NDArray[np.uint8],
     object_ids: NDArray[np.int32],
     mode: str,
-    label_of: Callable[[int], ChangeLabel],
+    label_of: Callable[[int], ChangeLabel | None],
     label_rgb: Mapping[ChangeLabel, Rgb],
     *,
     dark: bool,
 ) -> NDArray[np.uint8]:
-    """Colours of object points, (N, 3), for the mode ``label``, ``identity`` or ``true``."""
+    """Colours of object points, (N, 3), for the mode ``label``, ``identity`` or ``true``.
+
+    What has no label is painted like background.
+    """
     if mode == "true" or len(object_ids) == 0:
         return colours_rgb
     known = np.unique(object_ids)
@@ -171,6 +174,9 @@ def object_colours(
             paint[row] = identity_rgb(int(object_id))
             continue
         label = label_of(int(object_id))
+        if label is None:
+            strength[row] = 0.0
+            continue
         paint[row] = label_rgb[label]
         if label is ChangeLabel.STATIC:
             strength[row] = 0.5

@@ -17,11 +17,13 @@ from oasisview.panels.hud import Layers
 from oasisview.scene import outlines
 from oasisview.scene.cameras import draw_cameras
 from oasisview.scene.map_points import GROUND_RGB, MapPoints, Rgb, muted, object_colours
-from oasisview.scene.marks import LabelOf, Marks
+from oasisview.scene.marks import Marks
 from oasisview.scene.picking import pick_object
 from pipeline.result import ChangeLabel
 
 PAST_LABELS = (ChangeLabel.DISAPPEARED, ChangeLabel.MOVED)
+# Label of an object in the earlier and in the later visit's map; None = nothing is known of it yet.
+VisitLabels = tuple[Callable[[int], ChangeLabel | None], Callable[[int], ChangeLabel | None]]
 
 
 class MapView:
@@ -40,7 +42,7 @@ class MapView:
         client: viser.ClientHandle,
         catalogue: Catalogue,
         points: MapPoints,
-        label_of: LabelOf,
+        label_of: Callable[[int], ChangeLabel],
         label_rgb: Mapping[bool, Mapping[ChangeLabel, Rgb]],
         *,
         on_object: Callable[[int], None],
@@ -50,14 +52,15 @@ class MapView:
         self._scene = client.scene
         self._catalogue = catalogue
         self._points = points
-        self._label_of = label_of
+        self._decided: VisitLabels = (label_of, label_of)
+        self._labels: VisitLabels = self._decided
         self._label_rgb = label_rgb
         self._on_object = on_object
         self._on_keyframe = on_keyframe
         self._mode, self._colours, self._layers, self._dark = "after", "label", Layers(), False
         self._clouds: dict[str, viser.PointCloudHandle] = {}
         self._picks: dict[int, viser.BatchedMeshHandle] = {}
-        self.marks = Marks(client, catalogue, points, label_of, label_rgb)
+        self.marks = Marks(client, catalogue, points, self._shown_label, label_rgb)
 
     def build(self, mode: str, colours: str, layers: Layers, *, dark: bool) -> None:
         """Send everything once."""
@@ -110,6 +113,11 @@ class MapView:
         self._dark = dark
         self._ground()
         self.set_colours(self._colours)
+
+    def set_preview(self, labels: VisitLabels | None) -> None:
+        """Colour by other labels than the decided ones; None = by these again."""
+        self._labels = labels or self._decided
+        self.recolour()
 
     def recolour(self) -> None:
         """Follow changed labels: objects, their boxes, and what is shown of the earlier visit."""
@@ -184,6 +192,12 @@ class MapView:
 
     # Nodes
 
+    def _shown_label(self, object_id: int) -> ChangeLabel | None:
+        """The label of an object as a whole, for what is drawn once for both visits."""
+        item = self._catalogue.objects.get(object_id)
+        visit = self._catalogue.shown_session(item) if item is not None else 1
+        return self._labels[visit](object_id)
+
     def _draw_marks(self) -> None:
         self.marks.draw(self._mode, self._layers, dark=self._dark)
 
@@ -213,7 +227,7 @@ class MapView:
             points.objects_rgb,
             points.object_ids,
             self._colours,
-            self._label_of,
+            self._labels[visit],
             self._label_rgb[self._dark],
             dark=self._dark,
         )
@@ -236,7 +250,7 @@ class MapView:
             )
 
     def _past(self, object_ids: NDArray[np.int32]) -> NDArray[np.bool_]:
-        past = [i for i in np.unique(object_ids).tolist() if self._label_of(i) in PAST_LABELS]
+        past = [i for i in np.unique(object_ids).tolist() if self._labels[0](i) in PAST_LABELS]
         return np.isin(object_ids, past)
 
     def _shows(self, visit: int) -> bool:

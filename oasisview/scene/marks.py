@@ -23,7 +23,7 @@ from pipeline.result import ChangeLabel, MapObject, Sighting
 # More names than this cannot be read in a map anyway; the most doubtful ones stay.
 MAX_NAMES = 30
 NAMES_AFTER_S = 0.2
-LabelOf = Callable[[int], ChangeLabel]
+LabelOf = Callable[[int], ChangeLabel | None]
 
 
 class Marks:
@@ -92,7 +92,7 @@ class Marks:
         for item in self._catalogue.by_doubt():
             label = self._label_of(item.object_id)
             sighting = self._shown_sighting(item)
-            if label is ChangeLabel.STATIC or sighting is None:
+            if label in (None, ChangeLabel.STATIC) or sighting is None:
                 continue
             edges = self._box(sighting)
             if sighting.session == 0 and self._mode == "both":
@@ -203,7 +203,8 @@ class Marks:
         return item.sighting(1) or item.sighting(0)
 
     def _mark(self, item: MapObject) -> None:
-        label = self._label_of(item.object_id)
+        known = self._label_of(item.object_id)
+        label = ChangeLabel.UNKNOWN if known is None else known
         colour = self._label_rgb[self._dark][label]
         sighting = self._shown_sighting(item) or item.sightings[-1]
         self._scene.add_line_segments(

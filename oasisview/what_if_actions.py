@@ -1,0 +1,139 @@
+"""What one person tries out: other limits on the finished map, seen at once, recorded only when applied."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from functools import partial
+
+from oasisview import events, wording
+from oasisview.page import Page
+from oasisview.panels.what_if import controls_html, outcome_html, unavailable_html
+from oasisview.preview import Preview
+from oasisview.scene.map_view import VisitLabels
+from oasisview.shell import Shell
+from oasisview.what_if_limits import LIMITS, RULES, Trial
+from oasisview.workbench import Workbench
+from pipeline.association.cases import match_case
+from pipeline.change.relabel import Relabelled, WhatIf, what_if
+from pipeline.errors import OasisError
+from pipeline.result import ChangeLabel
+from pipeline.settings import Settings
+
+_log = logging.getLogger(__name__)
+
+
+class WhatIfActions:
+    """The what-if tab of one page.
+
+    Args:
+        shell, page, bench: the tab, its panels and the open result.
+        preview: colours of the map.
+        lock: held while the page's choices change.
+    """
+
+    def __init__(
+        self, shell: Shell, page: Page, bench: Workbench, preview: Preview, lock: threading.RLock
+    ) -> None:
+        self._shell = shell
+        self._page = page
+        self._bench = bench
+        self._preview = preview
+        self._lock = lock
+        self._again: WhatIf | None = None
+        self._trial = Trial.of(Settings())
+        self._relabelled: Relabelled | None = None
+
+    def bind(self) -> None:
+        """Connect the tab's events."""
+        on = self._shell.on_event
+        for limit in LIMITS:
+            steps = events.whole_number(limit.low, limit.high)
+            on(f"what_if_{limit.key}", partial(self.set_limit, limit.key), steps, latest_only=True)
+        on("what_if_rule", self.set_rule, events.choice(*RULES))
+        on("what_if_reset", lambda _: self.reset())
+
+    def open(self) -> None:
+        """Fill the tab once."""
+        with self._lock:
+            try:
+                self._again = what_if(self._bench.result)
+                self._trial = Trial.of(Settings.from_dict(self._bench.result.manifest.get("settings", {})))
+            except OasisError as error:
+                _log.warning("%s", error)
+                self._page.what_if.show(unavailable_html(str(error)), "")
+                return
+            if self._again is None:
+                self._page.what_if.show(unavailable_html(wording.NO_WHAT_IF), "")
+                return
+            self._show_controls()
+            self._show_outcome()
+
+    def set_limit(self, key: str, step: int) -> None:
+        """One slider was moved."""
+        with self._lock:
+            self._try(self._trial.with_step(key, step))
+
+    def set_rule(self, rule: str) -> None:
+        """What decides."""
+        with self._lock:
+            self._try(self._trial.with_rule(rule))
+            self._show_controls()
+
+    def reset(self) -> None:
+        """Back to the limits of the result."""
+        with self._lock:
+            self._try(Trial.of(self._trial.own))
+            self._show_controls()
+
+    def follow(self) -> None:
+        """Somebody decided something: what people decided is kept as it is."""
+        with self._lock:
+            if self._relabelled is not None:
+                self._show_outcome()
+
+    def _try(self, trial: Trial) -> None:
+        if self._again is None:
+            return
+        if trial.rule == "evidence" and not self._again.can_decide_by_evidence:
+            self._shell.toast(wording.NO_OVERLAP)
+            return
+        self._trial = trial
+        if trial.differences:
+            self._relabelled = self._again.under(trial.settings)
+            words = f"what if: {', '.join(trial.differences)}"
+            self._preview.show(words, self._labels(self._relabelled), self.reset)
+        else:
+            self._relabelled = None
+            self._preview.end(self.reset)
+        self._show_outcome()
+
+    def _labels(self, relabelled: Relabelled) -> VisitLabels:
+        """What people decided stands; the rest as tried."""
+        verdicts = self._bench.decisions.verdicts
+
+        def label(visit: int, object_id: int) -> ChangeLabel | None:
+            verdict = verdicts.get(object_id)
+            return verdict.label if verdict is not None else relabelled.by_visit[visit].get(object_id)
+
+        return partial(label, 0), partial(label, 1)
+
+    def _show_controls(self) -> None:
+        can = self._again is not None and self._again.can_decide_by_evidence
+        self._page.what_if.show_controls(controls_html(self._trial, can_change_rule=can))
+
+    def _show_outcome(self) -> None:
+        relabelled = self._relabelled or Relabelled(({}, {}), ())
+        decided = self._bench.decisions.verdicts.keys()
+        self._page.what_if.show_outcome(
+            outcome_html(self._bench.catalogue, self._trial, relabelled, decided, self._cases_changed())
+        )
+
+    def _cases_changed(self) -> int:
+        """Objects whose best match would be called another case; sure matches are named by two limits."""
+        gates = self._trial.settings.association
+        return sum(
+            match_case(item.sigma, item.s_bar, gates.tau_sigma, gates.tau_s) is not item.case
+            for item in self._bench.catalogue.objects.values()
+            if "tau_sigma" in self._trial.steps or "tau_s" in self._trial.steps
+        )

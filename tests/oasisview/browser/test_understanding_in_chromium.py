@@ -1,0 +1,112 @@
+"""What helps people to understand a result, in a real browser: what-if, matrix, belief, patches, pictures."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser_harness import Tabs, ViewerPage, connected
+from playwright.sync_api import Page, expect
+
+from oasisview.app import RunningApp, start
+from oasisview.inspector import Inspector
+from oasisview.scene.map_points import LABEL_RGB
+from pipeline.result import ChangeLabel
+
+PATIENCE_MS = 30_000
+WINDOW = (1366, 768)
+
+
+@pytest.fixture(scope="module")
+def app(_small_result_template: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
+    copy = shutil.copytree(_small_result_template, tmp_path_factory.mktemp("understanding") / "small.oasis")
+    running = start(copy, port=0)
+    yield running
+    running.stop()
+
+
+@pytest.fixture(scope="module")
+def _view_of_module(app: RunningApp, shared_tabs: Tabs) -> ViewerPage:
+    view = connected(app.server, shared_tabs.open(app.login_url, WINDOW), set())
+    view.page.wait_for_selector(".oa-row")
+    view.page.wait_for_selector("#oa-band img")
+    view.wait_node("/map/1/objects")
+    return view
+
+
+@pytest.fixture
+def view(_view_of_module: ViewerPage, chromium_page: Callable[..., Page]) -> ViewerPage:
+    """One page for all tests, none of which decides anything."""
+    _view_of_module.page.evaluate("() => { O('mode', 'after'); O('what_if_reset'); }")
+    _view_of_module.page.get_by_role("tab", name="Evidence").click()
+    return _view_of_module
+
+
+def inspector_of(app: RunningApp) -> Inspector:
+    (inspector,) = app.inspectors()
+    return inspector
+
+
+def drawn_like(app: RunningApp, view: ViewerPage, object_id: int, visit: int = 1) -> ChangeLabel:
+    """The label whose colour the browser was told to draw most points of an object in."""
+    bench = app.workbench
+    assert bench is not None
+    cloud = view.client.scene.get_handle_by_name(f"/map/{visit}/objects")
+    own = bench.points.visits[visit].object_ids == object_id
+    colour = np.median(np.asarray(cloud.colors)[own], axis=0)
+    hues = {label: np.array(rgb, float) for label, rgb in LABEL_RGB[False].items()}
+    # A label's colour is mixed with the muted own one.
+    return min(hues, key=lambda label: float(np.abs(0.75 * hues[label] + 0.25 * 200 - colour).sum()))
+
+
+def move_slider(view: ViewerPage, limit: str, value: int) -> None:
+    slider = view.page.locator(f'[data-send="what_if_{limit}"]')
+    slider.fill(str(value))
+
+
+def test_sliders_relabel_list_preview_and_take_nothing_as_decided(app, view) -> None:
+    page = view.page
+    page.get_by_role("tab", name="What-if").click()
+    expect(page.locator(".oa-what-if").nth(1)).to_contain_text("These are the limits of this result")
+    before = drawn_like(app, view, 6)
+    assert before is ChangeLabel.APPEARED
+
+    move_slider(view, "change", 99)
+    expect(page.locator('[data-limit="change"]')).to_have_text("99%", timeout=PATIENCE_MS)
+    expect(page.locator('[data-limit="nu_min"]')).to_have_text("50%")
+    expect(page.locator(".oa-preview")).to_have_count(0)  # evidence of 5 is 99.3 %: all stays
+
+    page.locator('[data-send="what_if_rule"]', has_text="matches").click()
+    page.wait_for_selector("[data-flips]")
+    expect(page.locator(".oa-preview")).to_contain_text("decided by matches alone", timeout=PATIENCE_MS)
+    page.locator('[data-send="what_if_tau_sigma"]').fill("100")
+    row = page.locator('.oa-flip[data-object="1"]')
+    expect(row).to_contain_text("same \u2192 gone and new, as two objects", timeout=PATIENCE_MS)
+    view.wait_for(lambda: drawn_like(app, view, 1) is ChangeLabel.APPEARED, "the map to show the preview")
+
+    row.click()
+    page.wait_for_selector('[data-evidence="1"]')
+    assert "static" in page.locator('[data-evidence="1"] [data-role=label]').inner_text()
+    assert not (app.workbench.result.path / "review.sqlite").exists()
+
+    page.locator(".oa-preview button").click()
+    expect(page.locator(".oa-preview")).to_have_count(0, timeout=PATIENCE_MS)
+    view.wait_for(lambda: drawn_like(app, view, 1) is ChangeLabel.STATIC, "the decided colours to return")
+    expect(page.locator('[data-limit="change"]')).to_have_text("50%", timeout=PATIENCE_MS)
+    assert not page.problems
+
+
+def test_moves_need_the_chance_that_the_slider_asks_for(app, view) -> None:
+    page = view.page
+    page.get_by_role("tab", name="What-if").click()
+    move_slider(view, "move", 95)
+    expect(page.locator('[data-role="flips"]')).to_have_text("2 of 12 would change", timeout=PATIENCE_MS)
+    expect(page.locator('.oa-flip[data-object="4"]')).to_contain_text("moved \u2192 gone and new")
+    page.locator(".oa-reset").click()
+    expect(page.locator(".oa-what-if").nth(1)).to_contain_text(
+        "These are the limits of this result", timeout=PATIENCE_MS
+    )
+    expect(page.locator('[data-send="what_if_move"]')).to_have_value("31", timeout=PATIENCE_MS)
