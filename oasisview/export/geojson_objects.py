@@ -68,7 +68,8 @@ def _local_frame(plan: GroundPlan) -> dict[str, Any]:
 def _feature(row: dict[str, Any], footprint: Footprint | None, origin: Georeference | None) -> dict[str, Any]:
     properties = {"id": row["id"], "label": row["label_final"], **row}
     # Flat values only: what tables of maps can show.
-    properties["sessions_seen"] = ";".join(map(str, row["sessions_seen"]))
+    for name in ("sessions_seen", "machine_ids"):
+        properties[name] = ";".join(map(str, row[name]))
     properties["notes"] = " | ".join(f"{note['who']}: {note['text']}" for note in row["notes"])
     properties["base_m"] = None if footprint is None else round(footprint.base_m, _LOCAL_DECIMALS)
     properties["top_m"] = None if footprint is None else round(footprint.top_m, _LOCAL_DECIMALS)

@@ -27,6 +27,7 @@ class ReportCards:
         result = reviewed.result
         self._limits = Limits.of(result)
         self._notes_of = reviewed.notes_of
+        self._machine_ids = lambda object_id: reviewed.corrected.objects[object_id].machine_ids
         self._number = {change.item.object_id: change.number for change in changes}
         self._taken_by = {
             e.disappeared_id: e.appeared_id for e in reviewed.replaced if is_standing(reviewed, e)
@@ -88,6 +89,8 @@ class ReportCards:
         if not change.final.overridden:
             return machine
         who = change.final.decided_by or ""
+        if change.label is change.item.label:
+            return f"{who} corrected what belongs to this object. What the machine went by: {machine}"
         said = wording.overridden(change.label, change.item.label, who)
         return f"{said} What the machine went by: {machine}"
 
@@ -106,6 +109,9 @@ class ReportCards:
             rows.append(("turned by", f"{np.degrees(item.rotation_rad):.0f}\u00b0"))
         machine = wording.LABEL_NAMES[item.label]
         rows.append(("confidence", f"{wording.percent(item.confidence)} (machine: {machine})"))
+        parts = self._machine_ids(item.object_id)
+        if parts != (item.object_id,):
+            rows.append(("made of", "the machine's " + ", ".join(f"#{part}" for part in parts)))
         rows.append(("decision", decided(change)))
         rows += [("note", f"{n.who}: {n.why}") for n in self._notes_of(item.object_id)]
         cells = "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in rows)

@@ -36,8 +36,15 @@ def _decision(event: Event) -> str:
         Kind.NOTE: "note",
         Kind.UNDO: f"taken back; {new} again",
         Kind.REDO: f"restored; {new} again",
-    }.get(event.kind, str(event.kind).replace("_", " "))
-    cells = (moment(event.at), event.who, f"#{event.object_id}", what, event.why)
+        Kind.MERGE: f"merged with others, now {new}",
+        Kind.SAME: f"the same as another, now {new}",
+        Kind.SPLIT: f"not one object, now {new}",
+        Kind.DROP: "not an object",
+        Kind.KEEP: "an object after all",
+        Kind.RESTORE: "an earlier state restored",
+    }[event.kind]
+    number = f"#{event.object_id}" if event.object_id else "all"
+    cells = (moment(event.at), event.who, number, what, event.why)
     return f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>\n"
 
 

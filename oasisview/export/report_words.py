@@ -142,9 +142,10 @@ def decided(change: Change) -> str:
     final = change.final
     if final.decided_by is None:
         return "not checked by a person"
-    did = "set by" if final.overridden else "confirmed by"
+    relabelled = final.overridden and final.label is not change.item.label
+    did = "set by" if relabelled else "corrected by" if final.overridden else "confirmed by"
     said = f"{did} {final.decided_by} on {moment(final.decided_at)}"
-    if final.overridden:
+    if relabelled:
         said += f" (the machine said {wording.LABEL_NAMES[change.item.label]})"
     return f"{said}: {final.why}" if final.why else said
 
