@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from oasisview.review import Decision, Event, FinalLabel, Journal, Kind
+from oasisview.review import Decision, Event, FinalLabel, Fragment, Group, Journal, Kind
 from pipeline.errors import OasisError
 from pipeline.result import ChangeLabel, Result
 
@@ -107,6 +107,23 @@ class SharedDecisions:
             decision = self._journal.decide(
                 object_id, label, who=who, why=reason, expected_event_id=seen_event_id
             )
+        self.refresh()
+        return decision
+
+    def decided_fragments(self) -> frozenset[Fragment]:
+        """Everything that a person's standing decision is about, what is no object included."""
+        state = self._journal.corrected()
+        decided = [entry.members for entry in state.objects.values() if entry.final.decided_by is not None]
+        return frozenset().union(*decided, *(entry.members for entry in state.dropped))
+
+    def apply_what_if(
+        self, groups: Sequence[Group], *, who: str, reason: str, seen_event_id: int | None
+    ) -> Decision:
+        """Store what other limits say, as one decision; raises as ``Journal.correct``."""
+        leading = min(groups[0].members).object_id
+        decision = self._journal.correct(
+            Kind.WHAT_IF, leading, groups, who=who, why=reason, expected_event_id=seen_event_id
+        )
         self.refresh()
         return decision
 

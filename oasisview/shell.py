@@ -223,6 +223,10 @@ class Shell:
         """Open a dialog that sends ``reason`` (text) or, only if chosen explicitly, ``no_reason``."""
         self._call("askReason", title, hint)
 
+    def ask_text(self, title: str, hint: str, text: str, kind: str) -> None:
+        """Open a dialog with a text to be changed or left as it is, and send it as an event of that kind."""
+        self._call("askText", title, hint, text, kind)
+
     def close(self) -> None:
         """Stop handling events; call when the client disconnects."""
         self._queue.close()

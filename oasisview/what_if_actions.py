@@ -10,8 +10,10 @@ from oasisview import events, wording
 from oasisview.page import Page
 from oasisview.panels.what_if import controls_html, outcome_html, unavailable_html
 from oasisview.preview import Preview
+from oasisview.review import ConflictError, Group
 from oasisview.scene.map_view import VisitLabels
 from oasisview.shell import Shell
+from oasisview.what_if_groups import what_if_groups
 from oasisview.what_if_limits import LIMITS, RULES, Trial
 from oasisview.workbench import Workbench
 from pipeline.association.cases import match_case
@@ -43,6 +45,7 @@ class WhatIfActions:
         self._again: WhatIf | None = None
         self._trial = Trial.of(Settings())
         self._relabelled: Relabelled | None = None
+        self._seen_event_id = bench.decisions.last_event_id
 
     def bind(self) -> None:
         """Connect the tab's events."""
@@ -52,6 +55,8 @@ class WhatIfActions:
             on(f"what_if_{limit.key}", partial(self.set_limit, limit.key), steps, latest_only=True)
         on("what_if_rule", self.set_rule, events.choice(*RULES))
         on("what_if_reset", lambda _: self.reset())
+        on("what_if_apply", lambda _: self.ask_to_apply())
+        on("what_if_reason", self.apply, events.text())
 
     def open(self) -> None:
         """Fill the tab once."""
@@ -85,6 +90,45 @@ class WhatIfActions:
         with self._lock:
             self._try(Trial.of(self._trial.own))
             self._show_controls()
+
+    def ask_to_apply(self) -> None:
+        """Ask for a reason; the limits are suggested as one."""
+        with self._lock:
+            count = len(_objects(self._groups()))
+            if count:
+                self._shell.ask_text(
+                    f"Apply these limits to {count} object{'' if count == 1 else 's'}?",
+                    f"One undo takes all of it back. {wording.REASON_HINT}",
+                    f"What if: {', '.join(self._trial.differences)}",
+                    "what_if_reason",
+                )
+
+    def apply(self, reason: str) -> None:
+        """Record what is tried as one decision; others' decisions meanwhile are a conflict."""
+        with self._lock:
+            groups = self._groups()
+            if not groups:
+                return
+            try:
+                self._bench.decisions.apply_what_if(
+                    groups,
+                    who=self._shell.user,
+                    reason=reason or wording.NO_REASON,
+                    seen_event_id=self._seen_event_id,
+                )
+            except ConflictError as conflict:
+                self._bench.decisions.refresh()
+                self._show_outcome()
+                self._shell.toast(str(conflict))
+                return
+            self.reset()
+            count = len(_objects(groups))
+            self._shell.toast(f"Saved: {count} object{'' if count == 1 else 's'} by other limits.", undo=True)
+
+    def _groups(self) -> list[Group]:
+        if self._relabelled is None:
+            return []
+        return what_if_groups(self._relabelled, self._bench.decisions.decided_fragments())
 
     def follow(self) -> None:
         """Somebody decided something: what people decided is kept as it is."""
@@ -124,9 +168,14 @@ class WhatIfActions:
 
     def _show_outcome(self) -> None:
         relabelled = self._relabelled or Relabelled(({}, {}), ())
-        decided = self._bench.decisions.verdicts.keys()
+        # What is on the screen is what applying is based on: newer decisions of others are a conflict.
+        self._seen_event_id = self._bench.decisions.last_event_id
+        decided = {f.object_id for f in self._bench.decisions.decided_fragments()}
+        applicable = len(_objects(self._groups()))
         self._page.what_if.show_outcome(
-            outcome_html(self._bench.catalogue, self._trial, relabelled, decided, self._cases_changed())
+            outcome_html(
+                self._bench.catalogue, self._trial, relabelled, decided, applicable, self._cases_changed()
+            )
         )
 
     def _cases_changed(self) -> int:
@@ -137,3 +186,8 @@ class WhatIfActions:
             for item in self._bench.catalogue.objects.values()
             if "tau_sigma" in self._trial.steps or "tau_s" in self._trial.steps
         )
+
+
+def _objects(groups: list[Group]) -> set[int]:
+    """The objects of the result that groups speak of."""
+    return {fragment.object_id for group in groups for fragment in group.members}

@@ -77,6 +77,11 @@
     field.focus();
   };
   const askNote = () => show(form("oa-ask", "Note"), "note");
+  const askText = (title, hint, text, kind) => {
+    const asked = form("oa-ask", title, hint);
+    asked.field.value = text;
+    show(asked, kind);
+  };
   const askReason = (title, hint) => {
     const asked = form("oa-ask", title, hint);
     asked.field.placeholder = "What shows it?";
@@ -119,6 +124,6 @@
   }, true);
 
   Object.assign(oasis, {
-    askReason, help, open, addKey: (key, meaning) => { known().push([key, meaning]); },
+    askReason, askText, help, open, addKey: (key, meaning) => { known().push([key, meaning]); },
   });
 })

@@ -40,6 +40,11 @@ def journal_html(events: Sequence[Event]) -> str:
     )
 
 
+def parts(count: int) -> str:
+    """How much a decision about many objects is about."""
+    return f"{count} thing{'' if count == 1 else 's'}"
+
+
 def _row(event: Event, *, struck: bool) -> str:
     new, old = LABEL_NAMES[event.new_label], LABEL_NAMES[event.old_label]
     what = {
@@ -54,6 +59,7 @@ def _row(event: Event, *, struck: bool) -> str:
         Kind.DROP: "not an object",
         Kind.KEEP: "an object after all",
         Kind.RESTORE: "an earlier state restored",
+        Kind.WHAT_IF: f"and others by other limits ({parts(len(event.groups))})",
     }[event.kind]
     reason = f"<q>{escape(event.why)}</q>" if event.why else ""
     return (

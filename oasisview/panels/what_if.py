@@ -81,6 +81,7 @@ def outcome_html(
     trial: Trial,
     relabelled: Relabelled,
     decided: Collection[int],
+    applicable: int,
     cases_changed: int,
 ) -> str:
     """What would be labelled otherwise.
@@ -90,6 +91,7 @@ def outcome_html(
         trial: what is tried.
         relabelled: its outcome.
         decided: objects that an inspector decided about, which stay as they are.
+        applicable: how many objects would be recorded.
         cases_changed: objects whose best match would be named another of the four cases.
     """
     flips = relabelled.flips
@@ -113,12 +115,19 @@ def outcome_html(
             f"{_count(cases_changed)} would have {_its(cases_changed)} best match named otherwise."
         )
     head = f"{len(flips)} of {len(catalogue.objects)} would change" if flips else "No label would change"
+    apply = (
+        f'<button class="oa-primary oa-apply" {sends("what_if_apply")} '
+        f'title="Record this in the journal, as one decision that one undo takes back">'
+        f"Apply to {_count(applicable)} \u2026</button>"
+        if applicable
+        else ""
+    )
     rows = "".join(_row(catalogue, flip, flip.object_id in decided) for flip in flips[:SHOWN])
     more = _note(f"{len(flips) - SHOWN} more are not listed.") if len(flips) > SHOWN else ""
     return (
         f'<div class="oa oa-what-if" data-flips="{len(flips)}">'
         f'<div class="oa-section"><span data-role="flips">{escape(head)}</span></div>'
-        f'<ul class="oa-flip-counts">{summary}</ul>{notes}{rows}{more}</div>'
+        f'<ul class="oa-flip-counts">{summary}</ul>{notes}{apply}{rows}{more}</div>'
     )
 
 

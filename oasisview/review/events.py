@@ -24,9 +24,10 @@ class Kind(StrEnum):
     DROP = "drop"  # said that it is no object
     KEEP = "keep"  # said that what was dropped is an object
     RESTORE = "restore"  # went back to an earlier state
+    WHAT_IF = "what_if"  # took over what other limits would say, of many objects at once
 
 
-CORRECTIONS = frozenset({Kind.MERGE, Kind.SAME, Kind.SPLIT, Kind.DROP, Kind.KEEP})
+CORRECTIONS = frozenset({Kind.MERGE, Kind.SAME, Kind.SPLIT, Kind.DROP, Kind.KEEP, Kind.WHAT_IF})
 DECISIONS = CORRECTIONS | {Kind.LABEL, Kind.ACCEPT, Kind.NOTE, Kind.RESTORE}
 
 
@@ -122,4 +123,5 @@ def _did(event: Event) -> str:
         Kind.DROP: f"said that object {number} is not an object",
         Kind.KEEP: f"said that object {number} is an object",
         Kind.RESTORE: "went back to an earlier state",
+        Kind.WHAT_IF: "applied other limits to many objects",
     }.get(event.kind, f"set object {number} to {event.new_label.name.lower()}")

@@ -43,10 +43,12 @@ class Relabelled:
     Attributes:
         by_visit: for the previous and the current visit, label by object id.
         flips: objects whose label or identity would change, in ascending id.
+        pairs: objects of the earlier and the later visit (ids of the result) that would be one.
     """
 
     by_visit: tuple[Mapping[int, ChangeLabel], Mapping[int, ChangeLabel]]
     flips: tuple[Flip, ...]
+    pairs: frozenset[tuple[int, int]] = frozenset()
 
     def label_of(self, object_id: int) -> ChangeLabel:
         """The label by which the object as a whole counts; the earlier visit leads as it does in a result.
@@ -91,15 +93,20 @@ class WhatIf:
             {i: ChangeLabel(int(c)) for i, c in zip(self._ids[0], decision.labels0[1:], strict=True)},
             {i: ChangeLabel(int(c)) for i, c in zip(self._ids[1], decision.labels1[1:], strict=True)},
         )
-        return Relabelled(labels, self._flips(labels, decision))
+        one = self._pairs(decision)
+        return Relabelled(labels, self._flips(labels, one), one)
 
-    def _flips(
-        self, labels: tuple[dict[int, ChangeLabel], dict[int, ChangeLabel]], decision: Decision
-    ) -> tuple[Flip, ...]:
-        one = {
+    def _pairs(self, decision: Decision) -> frozenset[tuple[int, int]]:
+        return frozenset(
             (self._ids[0][identity.previous - 1], self._ids[1][identity.current - 1])
             for identity in decision.identities
-        }
+        )
+
+    def _flips(
+        self,
+        labels: tuple[dict[int, ChangeLabel], dict[int, ChangeLabel]],
+        one: frozenset[tuple[int, int]],
+    ) -> tuple[Flip, ...]:
         whole = {before for before, after in one if before == after}
         joins = {before: after for before, after in one if before != after}
         joins |= {after: before for before, after in joins.items()}

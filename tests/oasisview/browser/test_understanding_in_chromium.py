@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import shutil
+import sqlite3
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -24,6 +26,14 @@ WINDOW = (1366, 768)
 def app(_small_result_template: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
     copy = shutil.copytree(_small_result_template, tmp_path_factory.mktemp("understanding") / "small.oasis")
     running = start(copy, port=0)
+    yield running
+    running.stop()
+
+
+@pytest.fixture
+def own_app(small_result_path: Path) -> Iterator[RunningApp]:
+    """For tests that decide something."""
+    running = start(small_result_path, port=0)
     yield running
     running.stop()
 
@@ -110,3 +120,37 @@ def test_moves_need_the_chance_that_the_slider_asks_for(app, view) -> None:
         "These are the limits of this result", timeout=PATIENCE_MS
     )
     expect(page.locator('[data-send="what_if_move"]')).to_have_value("31", timeout=PATIENCE_MS)
+
+
+def test_applying_is_one_journal_entry_with_the_limits_as_reason_and_one_undo_takes_it_back(
+    own_app, open_viewer, small_result_path
+) -> None:
+    view = open_viewer(own_app.server, size=(900, 620))
+    page = view.page
+    page.wait_for_selector(".oa-row")
+    page.get_by_role("tab", name="What-if").click()
+    page.locator('[data-send="what_if_nu_min"]').fill("100")
+    page.wait_for_selector("[data-flips]")
+    shown = int(page.locator("[data-flips]").get_attribute("data-flips"))
+    assert shown > 1
+    own_app.workbench.decisions.decide(8, ChangeLabel.STATIC, who="bob", reason="", seen_event_id=None)
+    expect(page.locator('.oa-flip[data-object="8"]')).to_contain_text("decided: kept", timeout=PATIENCE_MS)
+
+    page.locator(".oa-apply").click()
+    field = page.locator("#oa-ask textarea")
+    expect(field).to_have_value("What if: place looked at 100% instead of 50%", timeout=PATIENCE_MS)
+    field.press("Control+Enter")
+    expect(page.locator("#oa-toast")).to_contain_text("by other limits", timeout=PATIENCE_MS)
+    with sqlite3.connect(f"file:{small_result_path / 'review.sqlite'}?mode=ro", uri=True) as connection:
+        rows = connection.execute("SELECT kind, why, details FROM events WHERE kind = 'what_if'").fetchall()
+    ((_, why, details),) = rows
+    assert why == "What if: place looked at 100% instead of 50%"
+    assert len(json.loads(details)) == shown - 1
+    decisions = own_app.workbench.decisions
+    assert decisions.label_of(7) is ChangeLabel.UNKNOWN and decisions.label_of(8) is ChangeLabel.STATIC
+    page.get_by_role("tab", name="Journal").click()
+    expect(page.locator(".oa-entry").first).to_contain_text("by other limits", timeout=PATIENCE_MS)
+
+    page.keyboard.press("u")
+    view.wait_for(lambda: decisions.label_of(7) is ChangeLabel.APPEARED, "the undo")
+    assert decisions.label_of(8) is ChangeLabel.STATIC
