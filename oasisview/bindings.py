@@ -35,7 +35,8 @@ def _bind_selection(inspector: Inspector, shell: Shell) -> None:
     on("pixel", inspector.click_picture, events.pixel_click)
     on("filter", inspector.toggle_filter, events.choice(*LABEL_OF_NAME))
     on("swipe", lambda _: inspector.toggle_swipe())
-    on("export", inspector.download, events.choice(*(d.format for d in DOWNLOADS)))
+    on("export", inspector.exports.download, events.choice(*(d.format for d in DOWNLOADS)))
+    on("export_stop", lambda _: inspector.exports.stop())
 
 
 def _bind_decisions(inspector: Inspector, shell: Shell) -> None:

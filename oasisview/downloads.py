@@ -9,9 +9,10 @@ from pathlib import Path
 
 from oasisview.export import export
 from oasisview.panels.export import Download
+from pipeline.progress import Report, silent
 
 
-def make_download(result_path: Path, download: Download) -> tuple[str, bytes]:
+def make_download(result_path: Path, download: Download, report: Report = silent) -> tuple[str, bytes]:
     """Run an export and return the file's name, after the result, and its content.
 
     Seconds for large maps: keep it off the event loop. Raises what ``export`` raises.
@@ -19,7 +20,7 @@ def make_download(result_path: Path, download: Download) -> tuple[str, bytes]:
     name = f"{result_path.stem}{download.suffix}"
     with tempfile.TemporaryDirectory(prefix="oasisview-export-") as folder:
         path = Path(folder) / (result_path.stem if download.suffix.endswith(".zip") else name)
-        export(result_path, download.format, path)
+        export(result_path, download.format, path, report)
         return name, _zipped(path) if path.is_dir() else path.read_bytes()
 
 

@@ -16,12 +16,11 @@ import viser
 from oasisview import events, memory, wording
 from oasisview.bindings import bind
 from oasisview.crops import object_at
-from oasisview.downloads import make_download
+from oasisview.export_actions import ExportActions
 from oasisview.map_controls import MapControls
 from oasisview.matrix_actions import MatrixActions
 from oasisview.page import Choices, Page
 from oasisview.panels import queue
-from oasisview.panels.export import DOWNLOADS
 from oasisview.preview import Preview
 from oasisview.scene.map_points import LABEL_RGB
 from oasisview.scene.map_view import PAST_LABELS, MapView
@@ -30,7 +29,6 @@ from oasisview.verdict_actions import VerdictActions
 from oasisview.what_if_actions import WhatIfActions
 from oasisview.wording import LABEL_OF_NAME
 from oasisview.workbench import Workbench
-from pipeline.errors import OasisError
 from pipeline.result import MapObject
 
 WIDE_WINDOW_PX = 1600
@@ -62,6 +60,7 @@ class Inspector:
             self.choices.session = 0
         self._page = Page(client, shell, bench, self.choices)
         self.verdicts = VerdictActions(shell, self._page, bench, self._lock, self.select)
+        self.exports = ExportActions(client, self._page, bench, self._lock)
         self._map = MapView(
             client,
             self._catalogue,
@@ -126,6 +125,7 @@ class Inspector:
     def close(self) -> None:
         """The tab is gone."""
         self._closed = True
+        self.exports.close()
         self._map.close()
         self._decisions.unsubscribe(self._on_decisions)
         self._bench.leave(self._client.client_id, self._on_presence)
@@ -288,20 +288,3 @@ class Inspector:
             place = (self.choices.session, self.choices.keyframe)
             self._map.marks.show_keyframe(*place)
             self._shell.set_address(keyframe=memory.keyframe_address(*place))
-
-    def download(self, format_name: str) -> None:
-        """Write an export, and send it to the browser."""
-        download = next(d for d in DOWNLOADS if d.format == format_name)
-        self._say_export(f"Preparing {download.title} \u2026")
-        try:
-            name, content = make_download(self._bench.result.path, download)
-        except OasisError as error:
-            self._say_export(str(error))
-            return
-        self._client.send_file_download(name, content, save_immediately=True)
-        self._say_export(f"{name} was sent to your browser ({len(content) / 1e6:.1f} MB).")
-
-    def _say_export(self, status: str) -> None:
-        with self._lock:
-            self.choices.export_status = status
-            self._page.show_export()

@@ -44,6 +44,7 @@ class Choices:
     pending_label: tuple[int, ChangeLabel] | None = None
     conflict: str = ""
     export_status: str = ""
+    export_share: float | None = None  # of an export that is being made
 
 
 class Page:
@@ -131,7 +132,8 @@ class Page:
         """What can be downloaded."""
         listed = [i for i in self._catalogue.objects.values() if i.label in changed_labels()]
         reviewed = sum(item.object_id in self._decisions.verdicts for item in listed)
-        self._export.content = export_html(reviewed, len(listed), self.choices.export_status)
+        choices = self.choices
+        self._export.content = export_html(reviewed, len(listed), choices.export_status, choices.export_share)
 
     def show_band(self, *, whole: bool = False) -> None:
         """The band of keyframes; only what differs is swapped unless the whole is asked for."""
