@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from oasisview import heatmap_colours
 from oasisview.assets import Asset, AssetTable
+from oasisview.matrix_window import display_order
 from oasisview.object_views import BeforeAfter, ObjectView, ObjectViews
 from oasisview.wording import Limits
 from pipeline.errors import ResultError
@@ -154,6 +155,8 @@ class Catalogue:
     def _matrix(self, kind: str) -> Asset | None:
         matrix = self.result.score_matrix
         values = np.asarray(matrix.sigma if kind == "sigma" else matrix.s_bar, np.float32)
+        # As the panel draws it: partners on the diagonal.
+        values = values[np.ix_(*display_order(matrix))]
         table = heatmap_colours.ramp(heatmap_colours.CIVIDIS)
         return _png(table[np.round(np.clip(np.nan_to_num(values), 0, 1) * 255).astype(np.uint8)])
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import viser
 
 from oasisview.catalogue import changed_labels
+from oasisview.matrix_window import MatrixWindow
 from oasisview.panels import queue
 from oasisview.panels.band import band_html
 from oasisview.panels.evidence import evidence_html
@@ -40,6 +41,7 @@ class Choices:
     swipe: bool = False
     matrix_kind: str = "sigma"
     cell: tuple[int, int] | None = None
+    matrix_window: MatrixWindow = field(default_factory=MatrixWindow)
     preview: str = ""  # what the map's colours stand for while they are not the decided labels
     pending_label: tuple[int, ChangeLabel] | None = None
     conflict: str = ""
@@ -121,7 +123,7 @@ class Page:
         """The score matrix."""
         choices = self.choices
         self._matrix.content = matrix_html(
-            self._catalogue, choices.matrix_kind, choices.selected, choices.cell
+            self._catalogue, choices.matrix_kind, choices.selected, choices.cell, choices.matrix_window
         )
 
     def show_journal(self) -> None:

@@ -115,7 +115,9 @@ class Shell:
             "regions": get_args(Region),
             "maxText": events.MAX_TEXT_LENGTH,
         }
-        self._run(f"({_script('shell.js')})({json.dumps(options)});({_script('dialogs.js')})()")
+        self._run(
+            f"({_script('shell.js')})({json.dumps(options)});({_script('dialogs.js')})();({_script('grid.js')})()"
+        )
 
     @staticmethod
     def available() -> bool:

@@ -112,7 +112,10 @@ def _table(catalogue: Catalogue, found: list[Candidate], session: int) -> str:
         for row, value in ((sigma, candidate.sigma), (quality, candidate.s_bar)):
             ground, ink = share_colour(value)
             colours = f"background:{ground};color:{ink}"
-            row.append(f'<td class="oa-cell{frame}" {send} {tip} style="{colours}">{value:.2f}</td>')
+            row.append(
+                f'<td><button class="oa-cell{frame}" {send} {tip} aria-label="{escape(words)}" '
+                f'style="{colours}">{value:.2f}</button></td>'
+            )
     return (
         '<table class="oa-heat">'
         f"<tr><th></th>{''.join(pictures)}</tr><tr><th>#</th>{''.join(numbers)}</tr>"

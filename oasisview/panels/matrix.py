@@ -7,27 +7,22 @@ import numpy as np
 from oasisview import wording
 from oasisview.catalogue import Catalogue
 from oasisview.heatmap_colours import CIVIDIS, gradient_css
+from oasisview.matrix_window import MatrixWindow, display_order
 from oasisview.panels.markup import empty, picture, section, sends
 from oasisview.panels.matrix_close_up import close_up_html
 from oasisview.shell import escape
 from pipeline.result import ScoreMatrix
 
+MAX_FRAMED = 60
 KINDS = {"sigma": "matching patches \u03c3", "s_bar": "match quality s\u0304"}
 
 
 def cell_at(shape: tuple[int, int], u: float, v: float) -> tuple[int, int] | None:
-    """Row and column under a place (u, v) in [0, 1] of the picture; None for an empty matrix."""
+    """Row and column of the picture under a place (u, v) in [0, 1]; None for an empty matrix."""
     rows, columns = shape
     if rows == 0 or columns == 0:
         return None
     return min(int(v * rows), rows - 1), min(int(u * columns), columns - 1)
-
-
-def cell_of(matrix: ScoreMatrix, before_id: int, after_id: int) -> tuple[int, int] | None:
-    """Row and column of a pair of objects; None if there is no such pair."""
-    rows = np.flatnonzero(matrix.row_object_ids == before_id)
-    columns = np.flatnonzero(matrix.column_object_ids == after_id)
-    return (int(rows[0]), int(columns[0])) if len(rows) and len(columns) else None
 
 
 def pair_words(catalogue: Catalogue, row: int, column: int) -> str:
@@ -41,8 +36,15 @@ def pair_words(catalogue: Catalogue, row: int, column: int) -> str:
     return wording.CASE_WORDS[wording.pair_case(sigma, s_bar, catalogue.limits)]
 
 
-def matrix_html(catalogue: Catalogue, kind: str, selected: int | None, cell: tuple[int, int] | None) -> str:
+def matrix_html(
+    catalogue: Catalogue,
+    kind: str,
+    selected: int | None,
+    cell: tuple[int, int] | None,
+    window: MatrixWindow | None = None,
+) -> str:
     """The panel; a click in the picture arrives as the pixel event ``matrix``."""
+    window = window or MatrixWindow()
     matrix = catalogue.result.score_matrix
     rows, columns = matrix.sigma.shape
     if rows == 0 or columns == 0:
@@ -61,31 +63,39 @@ def matrix_html(catalogue: Catalogue, kind: str, selected: int | None, cell: tup
         '<div class="oa oa-matrix">'
         f'<div class="oa-segments" role="group" aria-label="What is shown">{switch}</div>'
         f'<div class="oa-note">Rows: {rows} objects before. Columns: {columns} objects after. '
-        "Framed: chosen partners. Click a place to see it close up.</div>"
+        "Chosen partners stand on the diagonal. Click a place to see it close up.</div>"
         f'<div class="oa-grid" style="aspect-ratio:{columns}/{rows}" '
         'data-pixel="matrix" data-session="0" data-keyframe="0">'
         f'<img src="{url}" alt="score matrix: {KINDS[kind]}" draggable="false">'
-        f"{_marks(catalogue, selected, cell)}</div>"
+        f"{_marks(matrix, selected, cell, window)}</div>"
         f'<div class="oa-colours"><span>0</span><i style="background:{gradient_css(CIVIDIS)}"></i>'
         "<span>1</span></div>"
-        f"{close_up_html(catalogue, kind, selected, cell, describe)}{_pair(catalogue, cell)}</div>"
+        f"{close_up_html(catalogue, kind, window, selected, cell, describe)}{_pair(catalogue, cell)}</div>"
     )
 
 
-def _marks(catalogue: Catalogue, selected: int | None, cell: tuple[int, int] | None) -> str:
-    matrix = catalogue.result.score_matrix
+def _marks(
+    matrix: ScoreMatrix, selected: int | None, cell: tuple[int, int] | None, window: MatrixWindow
+) -> str:
     rows, columns = matrix.sigma.shape
+    order = display_order(matrix)
+    row_ids, column_ids = matrix.row_object_ids[order[0]], matrix.column_object_ids[order[1]]
     marks = []
-    chosen = np.argwhere(matrix.row_object_ids[:, None] == matrix.column_object_ids[None, :])
-    for row, column in chosen:
-        marks.append(f'<rect class="oa-partner" x="{column}" y="{row}" width="1" height="1"/>')
+    if max(rows, columns) <= MAX_FRAMED:  # more frames than that would hide what they frame
+        for row, column in np.argwhere(row_ids[:, None] == column_ids[None, :]):
+            marks.append(f'<rect class="oa-partner" x="{column}" y="{row}" width="1" height="1"/>')
     if selected is not None:
-        for row in np.flatnonzero(matrix.row_object_ids == selected):
+        for row in np.flatnonzero(row_ids == selected):
             marks.append(f'<rect class="oa-own" x="0" y="{row}" width="{columns}" height="1"/>')
-        for column in np.flatnonzero(matrix.column_object_ids == selected):
+        for column in np.flatnonzero(column_ids == selected):
             marks.append(f'<rect class="oa-own" x="{column}" y="0" width="1" height="{rows}"/>')
+    if window.around == "place":
+        high, wide = min(window.span, rows), min(window.span, columns)
+        top, left = window.corner
+        marks.append(f'<rect class="oa-window" x="{left}" y="{top}" width="{wide}" height="{high}"/>')
     if cell is not None:
-        marks.append(f'<rect class="oa-picked" x="{cell[1]}" y="{cell[0]}" width="1" height="1"/>')
+        row, column = (int(np.flatnonzero(o == index)[0]) for o, index in zip(order, cell, strict=True))
+        marks.append(f'<rect class="oa-picked" x="{column}" y="{row}" width="1" height="1"/>')
     return f'<svg viewBox="0 0 {columns} {rows}" preserveAspectRatio="none">{"".join(marks)}</svg>'
 
 

@@ -154,3 +154,53 @@ def test_applying_is_one_journal_entry_with_the_limits_as_reason_and_one_undo_ta
     page.keyboard.press("u")
     view.wait_for(lambda: decisions.label_of(7) is ChangeLabel.APPEARED, "the undo")
     assert decisions.label_of(8) is ChangeLabel.STATIC
+
+
+def test_matrix_cells_are_walked_by_keys_say_their_case_and_show_their_pair(app, view) -> None:
+    page = view.page
+    page.evaluate("() => O('select', 8)")
+    page.wait_for_selector('[data-evidence="8"]')
+    value = page.locator('[data-evidence="8"] .oa-heat button.oa-cell').first
+    value.focus()
+    assert value.evaluate("node => document.activeElement === node")
+    assert "patches" in (value.get_attribute("aria-label") or "") or "\u03c3" in value.get_attribute(
+        "aria-label"
+    )
+
+    page.get_by_role("tab", name="Matrix").click()
+    table = page.locator("[data-grid]")
+    assert table.locator("th button img").count() == table.locator("th").count()
+    stops = table.locator('button.oa-cell[tabindex="0"]')
+    expect(stops).to_have_count(1)
+    stops.focus()
+    camera = view.client.camera.position
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowDown")
+    focused = page.evaluate("() => document.activeElement.dataset.words")
+    assert focused and "before" in focused
+    expect(page.locator(".oa-cell-words")).to_have_text(focused)
+    assert np.allclose(view.client.camera.position, camera)  # the arrows did not drive the camera
+
+    words = page.locator('[data-words^="#8 before, #7 after"]')
+    assert "case 3: looks alike" in words.get_attribute("data-words")
+    words.focus()
+    page.keyboard.press("Enter")
+    page.wait_for_selector('[data-pair="8-7"]')
+    page.locator('[data-send="matrix_kind"]', has_text="quality").click()
+    expect(page.locator('[data-words^="#8 before, #7 after"]')).to_contain_text("0.55", timeout=PATIENCE_MS)
+    page.locator('[data-send="matrix_kind"]', has_text="patches").click()
+
+    page.locator('[data-send="matrix_around"]', has_text="neighbours").click()
+    expect(page.locator(".oa-window")).to_have_count(1, timeout=PATIENCE_MS)
+    first = table.locator("tr").nth(1).locator("th button").get_attribute("title")
+    page.locator('[data-send="matrix_move"][title="Move down"]').click()
+    view.wait_js(
+        "title => document.querySelectorAll('[data-grid] tr')[1].querySelector('th button').title !== title",
+        first,
+    )
+    page.locator('[data-send="matrix_span"][title^="More"]').click()
+    expect(table.locator("tr")).to_have_count(9, timeout=PATIENCE_MS)  # 8 rows and the head: all there is
+    table.locator("th button").nth(3).click()
+    page.wait_for_function("() => document.querySelector('.oa-own-number')")
+    page.locator('[data-send="matrix_span"][title^="Fewer"]').click()
+    assert not page.problems
