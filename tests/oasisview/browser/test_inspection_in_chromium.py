@@ -19,6 +19,7 @@ from playwright.sync_api import Page, expect
 from oasisview import wording
 from oasisview.app import RunningApp, start
 from oasisview.inspector import Inspector
+from oasisview.matrix_window import display_order
 from pipeline.result import ChangeLabel
 
 # A busy machine draws a page in seconds, not milliseconds; never a measure of speed.
@@ -170,8 +171,9 @@ def test_clicking_objects_in_map_image_queue_and_matrix_shows_their_evidence(
 
     page.get_by_role("tab", name="Matrix").click()
     matrix = small_result.score_matrix
-    row = int(np.flatnonzero(matrix.row_object_ids == 8)[0])
-    column = int(np.flatnonzero(matrix.column_object_ids == 7)[0])
+    rows, columns = display_order(matrix)
+    row = int(np.flatnonzero(matrix.row_object_ids[rows] == 8)[0])
+    column = int(np.flatnonzero(matrix.column_object_ids[columns] == 7)[0])
     grid = page.locator(".oa-grid")
     box = grid.bounding_box()
     rows, columns = matrix.sigma.shape
