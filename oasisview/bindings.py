@@ -26,6 +26,7 @@ def bind(inspector: Inspector, shell: Shell) -> None:
     _bind_keyframes(inspector, shell)
     inspector.matrix.bind()
     inspector.what_if.bind()
+    inspector.belief.bind()
     _add_commands(inspector, shell)
 
 

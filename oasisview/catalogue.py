@@ -19,7 +19,15 @@ from oasisview.matrix_window import display_order
 from oasisview.object_views import BeforeAfter, ObjectView, ObjectViews
 from oasisview.wording import Limits
 from pipeline.errors import ResultError
-from pipeline.result import ChangeLabel, CovisiblePair, MapObject, Result, SessionResult, Sighting
+from pipeline.result import (
+    ChangeLabel,
+    CovisiblePair,
+    MapObject,
+    Result,
+    ScoreMatrix,
+    SessionResult,
+    Sighting,
+)
 
 # A shown keyframe is kept on selection if the object covers at least this share of it.
 VISIBLE_SHARE = 0.004
@@ -150,10 +158,13 @@ class Catalogue:
 
     def matrix_url(self, kind: str) -> str:
         """The whole score matrix as an image, one pixel a cell; kind is ``sigma`` or ``s_bar``."""
-        return self._register(f"matrix/{kind}.png", lambda: self._matrix(kind))
-
-    def _matrix(self, kind: str) -> Asset | None:
         matrix = self.result.score_matrix
+        # Corrected identities order it anew, and what an address stands for never changes.
+        ids = np.concatenate([matrix.row_object_ids, matrix.column_object_ids])
+        order = hashlib.sha256(ids.tobytes()).hexdigest()[:8]
+        return self._register(f"matrix/{order}/{kind}.png", lambda: self._matrix(kind, matrix))
+
+    def _matrix(self, kind: str, matrix: ScoreMatrix) -> Asset | None:
         values = np.asarray(matrix.sigma if kind == "sigma" else matrix.s_bar, np.float32)
         # As the panel draws it: partners on the diagonal.
         values = values[np.ix_(*display_order(matrix))]

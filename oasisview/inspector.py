@@ -14,6 +14,7 @@ from collections.abc import Callable
 import viser
 
 from oasisview import events, memory, wording
+from oasisview.belief_actions import BeliefActions
 from oasisview.bindings import bind
 from oasisview.crops import object_at
 from oasisview.export_actions import ExportActions
@@ -72,7 +73,8 @@ class Inspector:
         )
         self.controls = MapControls(shell, self._page, bench, self._map, self._lock, self._show_band)
         self.matrix = MatrixActions(shell, self._page, bench, self._lock)
-        self.preview = Preview(shell, self._page, self._map, self._lock)
+        self.preview = Preview(shell, self._map, self._lock)
+        self.belief = BeliefActions(shell, self._page, bench, self.preview, self._lock, self.show_keyframe)
         self.what_if = WhatIfActions(shell, self._page, bench, self.preview, self._lock)
 
     @property
@@ -166,6 +168,7 @@ class Inspector:
             self.choices.session = session
             self.choices.keyframe = min(max(keyframe, 0), count - 1)
             self._show_band()
+            self.belief.follow_keyframe()
 
     def _show_where_visible(self, item: MapObject) -> None:
         """An object that is not in the map of the visit shown brings the other visit in."""

@@ -18,7 +18,6 @@ from oasisview.panels.export import export_html
 from oasisview.panels.hud import Layers, hud_html, legend_html, who_html
 from oasisview.panels.journal import journal_html
 from oasisview.panels.matrix import matrix_html
-from oasisview.panels.preview import preview_html
 from oasisview.shell import Shell
 from oasisview.what_if_panel import WhatIfPanel
 from oasisview.workbench import Workbench
@@ -42,7 +41,7 @@ class Choices:
     matrix_kind: str = "sigma"
     cell: tuple[int, int] | None = None
     matrix_window: MatrixWindow = field(default_factory=MatrixWindow)
-    preview: str = ""  # what the map's colours stand for while they are not the decided labels
+    belief: int | None = None  # the moment of the later visit that is looked back at
     pending_label: tuple[int, ChangeLabel] | None = None
     conflict: str = ""
     export_status: str = ""
@@ -91,7 +90,7 @@ class Page:
         """Switches and legend over the map."""
         choices = self.choices
         hud = hud_html(choices.mode, choices.colours, choices.layers, dark=choices.dark)
-        self._shell.set_html("hud", hud + preview_html(choices.preview))
+        self._shell.set_html("hud", hud)
         self._shell.set_html("legend", legend_html(choices.colours, choices.mode))
 
     def show_who(self) -> None:
@@ -114,6 +113,7 @@ class Page:
             selected,
             self._decisions.verdicts.get(selected) if selected is not None else None,
             swipe=choices.swipe,
+            belief=choices.belief,
             can_undo=self._decisions.can_undo(self._shell.user),
             can_redo=self._decisions.can_redo(self._shell.user),
             conflict=choices.conflict or self._decisions.disagreement(selected),

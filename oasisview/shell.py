@@ -40,7 +40,7 @@ from oasisview.access import GuardedServer
 from oasisview.event_queue import EventQueue, Handler
 
 T = TypeVar("T")
-Region = Literal["band", "hud", "legend", "who", "page"]
+Region = Literal["band", "hud", "preview", "legend", "who", "page"]
 
 ACCENT_LIGHT = (36, 86, 200)
 ACCENT_DARK = (125, 167, 255)  # the light one is unreadable on the dark ground

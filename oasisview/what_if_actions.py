@@ -8,6 +8,7 @@ from functools import partial
 
 from oasisview import events, wording
 from oasisview.page import Page
+from oasisview.panels.preview import preview_html
 from oasisview.panels.what_if import controls_html, outcome_html, unavailable_html
 from oasisview.preview import Preview
 from oasisview.review import ConflictError, Group
@@ -145,8 +146,8 @@ class WhatIfActions:
         self._trial = trial
         if trial.differences:
             self._relabelled = self._again.under(trial.settings)
-            words = f"what if: {', '.join(trial.differences)}"
-            self._preview.show(words, self._labels(self._relabelled), self.reset)
+            bar = preview_html(f"what if: {', '.join(trial.differences)}")
+            self._preview.show(bar, self._labels(self._relabelled), self.reset)
         else:
             self._relabelled = None
             self._preview.end(self.reset)

@@ -10,6 +10,7 @@ from oasisview import wording
 from oasisview.catalogue import Catalogue
 from oasisview.decisions import Verdict
 from oasisview.panels.before_after import before_after_html
+from oasisview.panels.belief_strip import strip_html
 from oasisview.panels.candidates import candidates_html, replaced_html
 from oasisview.panels.markup import chip, empty, section
 from oasisview.panels.verdict import undo_html, verdict_html
@@ -24,6 +25,7 @@ def evidence_html(
     verdict: Verdict | None,
     *,
     swipe: bool = False,
+    belief: int | None = None,
     can_undo: bool = False,
     can_redo: bool = False,
     conflict: str = "",
@@ -42,6 +44,7 @@ def evidence_html(
         _numbers(item, catalogue.limits),
         replaced_html(catalogue, item),
         candidates_html(catalogue, item),
+        strip_html(catalogue, item, belief),
         _facts(item),
     ]
     return (

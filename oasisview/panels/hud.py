@@ -64,6 +64,8 @@ def hud_html(mode: str, colours: str, layers: Layers, *, dark: bool) -> str:
     return (
         '<div class="oa oa-hud">'
         f'<span class="oa-segments" role="group" aria-label="Map of which visit">{visits}</span>'
+        f'<button {sends("belief")} title="Look back at what was believed during the later visit">'
+        "Over time</button>"
         f'<button {sends("overview")} title="See the whole site (H)">Overview</button>'
         '<details><summary title="What the map shows and how it is coloured">Layers</summary>'
         f'<div class="oa-popup"><b>Colour of objects</b>{paints}<b>Show</b>{switches}</div></details>'

@@ -7,9 +7,7 @@ from oasisview.shell import escape
 
 
 def preview_html(words: str) -> str:
-    """Below the switches over the map; empty without a preview."""
-    if not words:
-        return ""
+    """The bar below the switches over the map."""
     return (
         f'<div class="oa oa-preview" role="status"><b>Preview</b> <span title="{escape(words)}">'
         f"{escape(words)}</span>"

@@ -50,7 +50,7 @@ def _view_of_module(app: RunningApp, shared_tabs: Tabs) -> ViewerPage:
 @pytest.fixture
 def view(_view_of_module: ViewerPage, chromium_page: Callable[..., Page]) -> ViewerPage:
     """One page for all tests, none of which decides anything."""
-    _view_of_module.page.evaluate("() => { O('mode', 'after'); O('what_if_reset'); }")
+    _view_of_module.page.evaluate("() => { O('mode', 'after'); O('end_preview'); }")
     _view_of_module.page.get_by_role("tab", name="Evidence").click()
     return _view_of_module
 
@@ -203,4 +203,43 @@ def test_matrix_cells_are_walked_by_keys_say_their_case_and_show_their_pair(app,
     table.locator("th button").nth(3).click()
     page.wait_for_function("() => document.querySelector('.oa-own-number')")
     page.locator('[data-send="matrix_span"][title^="Fewer"]').click()
+    assert not page.problems
+
+
+def test_belief_is_seen_in_the_strip_and_the_map_follows_slider_and_band(app, view) -> None:
+    page = view.page
+    slow = next(i for i in app.workbench.catalogue.objects.values() if i.object_id == 5)
+    page.evaluate("id => O('select', id)", slow.object_id)
+    page.wait_for_selector(f'[data-evidence="{slow.object_id}"]')
+    cells = page.locator(".oa-belief button")
+    expect(cells).to_have_count(2)
+    assert cells.first.get_attribute("aria-label") == "After keyframe 3: unknown"
+    assert cells.last.get_attribute("aria-label") == "After keyframe 6: moved"
+
+    cells.first.click()
+    bar = page.locator("#oa-preview")
+    expect(bar).to_contain_text("as believed after keyframe 3 of 6", timeout=PATIENCE_MS)
+    page.wait_for_function("() => document.querySelector('[data-part=jump]').value === '3'")
+    view.wait_for(lambda: drawn_like(app, view, 5) is ChangeLabel.UNKNOWN, "the map of that moment")
+    expect(page.locator('.oa-belief button[aria-pressed="true"]')).to_have_count(1, timeout=PATIENCE_MS)
+
+    slider = bar.get_by_role("slider")
+    slider.fill("1")
+    expect(bar).to_contain_text("after keyframe 6 of 6")
+    view.wait_for(lambda: drawn_like(app, view, 5) is ChangeLabel.MOVED, "the map of the later moment")
+    page.wait_for_function("() => document.querySelector('[data-part=jump]').value === '6'")
+
+    page.locator('[data-part="jump"]').fill("1")
+    expect(bar).to_contain_text("before anything was believed", timeout=PATIENCE_MS)
+    expect(bar.get_by_role("slider")).to_have_value("-1", timeout=PATIENCE_MS)
+
+    page.get_by_role("tab", name="What-if").click()
+    move_slider(view, "move", 95)  # another preview takes its place
+    expect(bar).to_contain_text("what if", timeout=PATIENCE_MS)
+    page.locator('#oa-hud [data-send="belief"]').click()
+    expect(bar).to_contain_text("before anything was believed", timeout=PATIENCE_MS)
+    expect(page.locator(".oa-what-if").nth(1)).to_contain_text("These are the limits of this result")
+    bar.locator("button").click()
+    expect(bar).to_be_empty(timeout=PATIENCE_MS)
+    view.wait_for(lambda: drawn_like(app, view, 5) is ChangeLabel.MOVED, "what has been decided")
     assert not page.problems
