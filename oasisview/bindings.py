@@ -24,6 +24,8 @@ def bind(inspector: Inspector, shell: Shell) -> None:
     _bind_decisions(inspector, shell)
     _bind_map(inspector, shell)
     _bind_keyframes(inspector, shell)
+    inspector.queue.bind()
+    inspector.corrections.bind()
     inspector.matrix.bind()
     inspector.what_if.bind()
     inspector.belief.bind()
@@ -32,9 +34,8 @@ def bind(inspector: Inspector, shell: Shell) -> None:
 
 def _bind_selection(inspector: Inspector, shell: Shell) -> None:
     on = shell.on_event
-    on("select", lambda object_id: inspector.select(object_id, fly=True), events.object_id)
+    on("select", lambda object_id: inspector.pick(object_id, fly=True), events.object_id)
     on("pixel", inspector.click_picture, events.pixel_click)
-    on("filter", inspector.toggle_filter, events.choice(*LABEL_OF_NAME))
     on("swipe", lambda _: inspector.toggle_swipe())
     on("export", inspector.exports.download, events.choice(*(d.format for d in DOWNLOADS)))
     on("export_stop", lambda _: inspector.exports.stop())
@@ -82,8 +83,6 @@ def _add_commands(inspector: Inspector, shell: Shell) -> None:
     def asker(name: str) -> Callable[[], None]:
         return lambda: verdicts.ask(LABEL_OF_NAME[name])
 
-    add("Next object in the queue", "J", lambda: inspector.step(1))
-    add("Previous object in the queue", "K", lambda: inspector.step(-1))
     for number, label in enumerate(queue.LABEL_ORDER, start=1):
         add(f"Set label: {LABEL_NAMES[label]}", str(number), asker(LABEL_NAMES[label]))
     add("Undo", "U", verdicts.undo)

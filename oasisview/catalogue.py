@@ -1,12 +1,13 @@
 """An opened result as the viewer needs it: which sighting to show, in which order, with which pictures.
 
-Read-only after construction and shared by all inspectors; methods that read images run on worker threads.
+Shared by all inspectors; what it holds is replaced as a whole when somebody corrects an object. Methods
+that read images run on worker threads.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 
 import cv2
@@ -17,6 +18,8 @@ from oasisview import heatmap_colours
 from oasisview.assets import Asset, AssetTable
 from oasisview.matrix_window import display_order
 from oasisview.object_views import BeforeAfter, ObjectView, ObjectViews
+from oasisview.priority import priority
+from oasisview.review import CorrectedMap, Fragment, corrected_result
 from oasisview.wording import Limits
 from pipeline.errors import ResultError
 from pipeline.result import (
@@ -34,7 +37,7 @@ VISIBLE_SHARE = 0.004
 
 
 class Catalogue:
-    """Facts and pictures of a result; ``assets`` serves the pictures.
+    """Facts and pictures of a result, as corrected so far; ``assets`` serves the pictures.
 
     Raises:
         ResultError: the result holds fewer than two visits.
@@ -45,7 +48,7 @@ class Catalogue:
             raise ResultError(
                 f"{result.path} holds a single visit", "process two visits with `oasisview run`"
             )
-        self.result = result
+        self.result = self._machine = result
         self.limits = Limits.of(result)
         self.objects: dict[int, MapObject] = {item.object_id: item for item in result.objects}
         self._assets = assets
@@ -53,9 +56,22 @@ class Catalogue:
         stamp = f"{result.path.resolve()}|{sorted(map(str, result.manifest.items()))}"
         # Keys stand for content that never changes: another result on the same port gets other keys.
         self._prefix = hashlib.sha256(stamp.encode()).hexdigest()[:12]
+        self._object_of: Mapping[Fragment, int] = {}
+        self._forget_pictures()
+
+    def follow(self, corrected: CorrectedMap) -> None:
+        """Show objects as people corrected them; call before pages are told of the change."""
+        self.result = corrected_result(self._machine, corrected)
+        self.objects = {number: entry.item for number, entry in corrected.objects.items()}
+        if corrected.object_of != self._object_of:
+            self._object_of = corrected.object_of
+            self._forget_pictures()
+
+    def _forget_pictures(self) -> None:
+        """Which pictures show an object depends on what is one object."""
         self._thumbnail = lru_cache(maxsize=4096)(self._tight_crop)
         self.mask = lru_cache(maxsize=64)(self._mask)
-        self._views = ObjectViews(result, self.mask, self._register)
+        self._views = ObjectViews(self.result, self.mask, self._register)
 
     def session(self, index: int) -> SessionResult:
         """One visit."""
@@ -70,10 +86,8 @@ class Catalogue:
         return item.sightings[-1] if item.sightings else None
 
     def doubt(self, item: MapObject) -> float:
-        """How much a look at the object is worth: doubt in its label times its size in metres."""
-        shown = self.shown_sighting(item)
-        extent = np.prod(np.maximum(shown.extent_m, 0.01)) ** (1 / 3) if shown is not None else 0.01
-        return float((1.0 - item.confidence) * extent)
+        """How much a look at the object is worth (``oasisview.priority``)."""
+        return priority(item)
 
     def by_doubt(self) -> list[MapObject]:
         """All objects, most doubtful first; ties by id so that the order never flickers."""
@@ -86,7 +100,8 @@ class Catalogue:
             return None
         matrix = self.result.score_matrix
         ids = matrix.column_object_ids if item.sighting(0) is not None else matrix.row_object_ids
-        return int(ids[instance]) if 0 <= instance < len(ids) else None
+        found = int(ids[instance]) if 0 <= instance < len(ids) else 0
+        return found or None
 
     # Keyframes
 

@@ -53,6 +53,9 @@ def event_words(event: Event, machine: MachineMap, target: Event | None = None) 
                 if event.target_id
                 else "back to what the machine found"
             )
+        case Kind.WHAT_IF:
+            many = len(event.groups)
+            return f"other limits applied to {many} object{'' if many == 1 else 's'}"
         case Kind.DROP:
             return f"{_parts_of(event, machine)} is not an object"
         case Kind.KEEP:

@@ -11,7 +11,21 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from oasisview.review import Decision, Event, FinalLabel, Fragment, Group, Journal, Kind
+from oasisview.correction_words import disagreement_words, event_words
+from oasisview.review import (
+    CorrectedMap,
+    CorrectedObject,
+    Decision,
+    Event,
+    Fragment,
+    Group,
+    Journal,
+    Kind,
+    MachineMap,
+)
+from oasisview.review.corrections import Correction
+from oasisview.review.disagreement import Opinion
+from oasisview.review.replay import Change
 from pipeline.errors import OasisError
 from pipeline.result import ChangeLabel, Result
 
@@ -23,7 +37,8 @@ _log = logging.getLogger(__name__)
 class Verdict:
     """A person's standing decision about an object.
 
-    ``accepted`` = the machine's label was confirmed; ``at`` is UTC in ISO 8601.
+    ``accepted`` = the machine's label was confirmed; ``at`` is UTC in ISO 8601; ``correction`` = what was
+    said about which pieces are one object, empty where the object is as the machine found it.
     """
 
     label: ChangeLabel
@@ -31,6 +46,7 @@ class Verdict:
     who: str
     at: str
     reason: str
+    correction: str = ""
 
 
 Listener = Callable[[frozenset[int]], None]
@@ -43,14 +59,11 @@ class SharedDecisions:
     """
 
     def __init__(self, result: Result) -> None:
-        self._machine = {item.object_id: item.label for item in result.objects}
         self._journal = Journal.of(result)
         self._listeners: list[Listener] = []
         self._lock = threading.Lock()
         self._stop = threading.Event()
-        self._final: dict[int, FinalLabel] = self._journal.final_labels()
-        self._last_event_id = self._journal.last_event_id
-        self._verdicts = _verdicts(self._final)
+        self._take(self._journal.last_event_id)
         self._poller = threading.Thread(target=self._poll, name="oasisview-decisions", daemon=True)
         self._poller.start()
 
@@ -58,6 +71,21 @@ class SharedDecisions:
     def verdicts(self) -> Mapping[int, Verdict]:
         """Standing decisions by object id; a snapshot that never changes under the reader."""
         return self._verdicts
+
+    @property
+    def corrected(self) -> CorrectedMap:
+        """The map with all decisions applied; a snapshot."""
+        return self._corrected
+
+    @property
+    def disagreements(self) -> Mapping[int, tuple[Opinion, ...]]:
+        """Opinions that contradict each other, by object id; a snapshot."""
+        return self._disagreements
+
+    @property
+    def undone(self) -> frozenset[int]:
+        """Numbers of the decisions that do not count at present; a snapshot."""
+        return self._undone
 
     @property
     def last_event_id(self) -> int:
@@ -69,22 +97,17 @@ class SharedDecisions:
         verdict = self._verdicts.get(object_id)
         if verdict is not None:
             return verdict.label
-        return self._machine.get(object_id, ChangeLabel.UNKNOWN)
+        entry = self._corrected.objects.get(object_id)
+        return entry.item.label if entry is not None else ChangeLabel.UNKNOWN
 
     def history(self) -> tuple[Event, ...]:
         """Every event of the journal, oldest first."""
         return self._journal.changes_since(0)
 
     def disagreement(self, object_id: int | None) -> str:
-        """A sentence if people's standing labels of an object differ, else empty."""
-        said: dict[str, Decision] = {}
-        for decision in self._journal.decisions():
-            if decision.object_id == object_id and decision.kind is not Kind.NOTE and not decision.undone:
-                said[decision.who] = decision
-        if len({decision.new_label for decision in said.values()}) < 2:
-            return ""
-        voices = ", ".join(f"{who} says {d.new_label.name.lower()}" for who, d in said.items())
-        return f"Inspectors disagree: {voices}. The latest decision counts."
+        """A sentence if people's standing decisions about an object differ, else empty."""
+        opinions = self._disagreements.get(object_id, ()) if object_id is not None else ()
+        return disagreement_words(opinions, self._corrected.machine)
 
     def subscribe(self, listener: Listener) -> None:
         """Call ``listener`` with the objects that changed, on whatever thread noticed."""
@@ -101,7 +124,8 @@ class SharedDecisions:
         self, object_id: int, label: ChangeLabel, *, who: str, reason: str, seen_event_id: int | None
     ) -> Decision:
         """Store a label; raises as ``Journal.decide``. The decision is on the disk when this returns."""
-        if label is self._machine.get(object_id):
+        entry = self._corrected.objects.get(object_id)
+        if entry is not None and label is entry.item.label:
             decision = self._journal.accept(object_id, who=who, why=reason, expected_event_id=seen_event_id)
         else:
             decision = self._journal.decide(
@@ -124,6 +148,35 @@ class SharedDecisions:
         decision = self._journal.correct(
             Kind.WHAT_IF, leading, groups, who=who, why=reason, expected_event_id=seen_event_id
         )
+        self.refresh()
+        return decision
+
+    def preview(self, correction: Correction) -> CorrectedMap:
+        """The map that a correction would give."""
+        return self._journal.preview(correction.kind, correction.object_id, correction.groups)
+
+    def correct(
+        self, correction: Correction, *, who: str, reason: str, seen_event_id: int | None
+    ) -> Decision:
+        """Store a correction; raises as ``Journal.correct``."""
+        decision = self._journal.correct(
+            correction.kind,
+            correction.object_id,
+            correction.groups,
+            who=who,
+            why=reason,
+            expected_event_id=seen_event_id,
+        )
+        self.refresh()
+        return decision
+
+    def restoring(self, event_id: int) -> Change:
+        """What going back to the state after an event would change."""
+        return self._journal.restoring(event_id)
+
+    def restore(self, event_id: int, *, who: str, reason: str, seen_event_id: int | None) -> Decision | None:
+        """Go back to the state after an event; raises as ``Journal.restore``."""
+        decision = self._journal.restore(event_id, who=who, why=reason, expected_event_id=seen_event_id)
         self.refresh()
         return decision
 
@@ -159,17 +212,34 @@ class SharedDecisions:
             events = self._journal.changes_since(self._last_event_id)
             if not events:
                 return frozenset()
-            self._final = self._journal.final_labels()
-            self._verdicts = _verdicts(self._final)
-            self._last_event_id = events[-1].id
+            before = self._corrected
+            self._take(events[-1].id)
+            fragments = frozenset[Fragment]().union(*(self._journal.fragments_of(e) for e in events))
+            # What follows from a decision elsewhere (a replaced event that ends) is drawn anew as well.
+            changed = before.concerned(fragments) | self._corrected.concerned(fragments)
+            changed |= {event.object_id for event in events if event.object_id}
             listeners = tuple(self._listeners)
-        changed = frozenset(event.object_id for event in events)
         for listener in listeners:
             try:
                 listener(changed)
             except Exception:  # one broken page must not keep the others from hearing
                 _log.exception("a page could not be refreshed")
         return changed
+
+    def _take(self, last_event_id: int) -> None:
+        """Build everything anew that is asked for often; done once per decision, not once per page."""
+        state = self._journal.snapshot()
+        self._corrected, self._disagreements, self._undone = (
+            state.corrected,
+            state.disagreements,
+            state.undone,
+        )
+        self._verdicts = {
+            number: _verdict(entry, state.corrected.machine)
+            for number, entry in state.corrected.objects.items()
+            if entry.final.decided_by is not None
+        }
+        self._last_event_id = last_event_id
 
     def close(self) -> None:
         """Stop following and let go of the file."""
@@ -189,15 +259,13 @@ class SharedDecisions:
                     _log.warning("%s", error)
 
 
-def _verdicts(final: Mapping[int, FinalLabel]) -> dict[int, Verdict]:
-    return {
-        object_id: Verdict(
-            label=entry.label,
-            accepted=not entry.overridden,
-            who=entry.decided_by,
-            at=entry.decided_at or "",
-            reason=entry.why or "",
-        )
-        for object_id, entry in final.items()
-        if entry.decided_by is not None
-    }
+def _verdict(entry: CorrectedObject, machine: MachineMap) -> Verdict:
+    final = entry.final
+    return Verdict(
+        label=final.label,
+        accepted=not final.overridden,
+        who=final.decided_by or "",
+        at=final.decided_at or "",
+        reason=final.why or "",
+        correction="" if entry.cause is None else event_words(entry.cause, machine),
+    )

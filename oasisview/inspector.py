@@ -16,19 +16,19 @@ import viser
 from oasisview import events, memory, wording
 from oasisview.belief_actions import BeliefActions
 from oasisview.bindings import bind
+from oasisview.correction_actions import CorrectionActions
 from oasisview.crops import object_at
 from oasisview.export_actions import ExportActions
 from oasisview.map_controls import MapControls
 from oasisview.matrix_actions import MatrixActions
 from oasisview.page import Choices, Page
-from oasisview.panels import queue
 from oasisview.preview import Preview
+from oasisview.queue_actions import QueueActions
 from oasisview.scene.map_points import LABEL_RGB
 from oasisview.scene.map_view import PAST_LABELS, MapView
 from oasisview.shell import Shell
 from oasisview.verdict_actions import VerdictActions
 from oasisview.what_if_actions import WhatIfActions
-from oasisview.wording import LABEL_OF_NAME
 from oasisview.workbench import Workbench
 from pipeline.result import MapObject
 
@@ -68,10 +68,12 @@ class Inspector:
             bench.points,
             self._decisions.label_of,
             LABEL_RGB,
-            on_object=self.select,
+            on_object=self.pick,
             on_keyframe=self.show_keyframe,
         )
         self.controls = MapControls(shell, self._page, bench, self._map, self._lock, self._show_band)
+        self.corrections = CorrectionActions(shell, self._page, bench, self._lock, self.select)
+        self.queue = QueueActions(shell, self._page, bench, self._lock, self.select)
         self.matrix = MatrixActions(shell, self._page, bench, self._lock)
         self.preview = Preview(shell, self._map, self._lock)
         self.belief = BeliefActions(shell, self._page, bench, self.preview, self._lock, self.show_keyframe)
@@ -101,11 +103,13 @@ class Inspector:
             self._client.camera.position = home.position
             self._client.camera.look_at = home.target
             self._page.show_hud()
+            self._page.show_queue_tools()
             self._page.show_queue()
             self._page.show_journal()
             self._page.show_export()
             self.what_if.open()
-            wanted = hello.object_id if hello is not None else None
+            linked = hello.object_id if hello is not None else None
+            wanted = self._decisions.corrected.present_id(linked) if linked is not None else None
             if wanted in self._catalogue.objects:
                 # A keyframe in the address was being looked at together with the object.
                 self.select(wanted, fly=True, keep_keyframe=hello is not None and "keyframe" in hello.address)
@@ -134,6 +138,12 @@ class Inspector:
 
     # Selection and keyframes
 
+    def pick(self, object_id: int, *, fly: bool = False, keep_keyframe: bool = False) -> None:
+        """An object was clicked somewhere: it is selected, or completes a correction that waits for it."""
+        present = self._decisions.corrected.present_id(object_id)
+        if present is not None and not self.corrections.picked(present):
+            self.select(present, fly=fly, keep_keyframe=keep_keyframe)
+
     def select(self, object_id: int | None, *, fly: bool = False, keep_keyframe: bool = False) -> None:
         """Show an object everywhere; the keyframe stays if it shows the object well enough."""
         with self._lock:
@@ -153,11 +163,6 @@ class Inspector:
             if fly:
                 self.controls.fly_selected()
             self._page.show_matrix()
-
-    def step(self, by: int) -> None:
-        """Select the object ``by`` rows further down the queue."""
-        order = queue.queue_order(self._catalogue, self._decisions.verdicts, self.choices.shown)
-        self.select(queue.step(order, self.choices.selected, by), fly=True)
 
     def show_keyframe(self, session: int, keyframe: int) -> None:
         """Show a keyframe in the band; numbers beyond the ends mean the ends."""
@@ -225,7 +230,7 @@ class Inspector:
             return
         found = object_at(self._catalogue.mask(click.session, click.keyframe), click.u, click.v)
         if found in self._catalogue.objects:
-            self.select(found, keep_keyframe=True)
+            self.pick(found, keep_keyframe=True)
         else:
             self._shell.toast("No object there.")
 
@@ -243,8 +248,11 @@ class Inspector:
         with self._lock:
             if self._closed:
                 return
+            chosen = self.choices.selected
+            if chosen is not None and chosen not in self._catalogue.objects:
+                self._follow_selection(self._decisions.corrected.present_id(chosen))
             self._page.show_queue()
-            self._map.recolour()
+            self._map.follow(self._bench.points)
             self._page.show_journal()
             self._page.show_export()
             self.what_if.follow()
@@ -253,6 +261,17 @@ class Inspector:
                 if self.choices.selected in changed:
                     self._map.marks.select(self._selected())
                     self._show_band()
+
+    def _follow_selection(self, object_id: int | None) -> None:
+        """The selected object became part of another one, or is none any more."""
+        self.choices.selected = None
+        self._shell.set_selection(None)
+        self._map.marks.select(None)
+        if object_id is not None:
+            self.select(object_id)
+        else:
+            self._page.show_evidence()
+            self._show_band()
 
     def _on_presence(self) -> None:
         self._later(self._page.show_who)
@@ -271,13 +290,6 @@ class Inspector:
         asyncio.run_coroutine_threadsafe(run(), self._loop)
 
     # What is shown
-
-    def toggle_filter(self, name: str) -> None:
-        """Show or hide a label in the queue."""
-        with self._lock:
-            self.choices.shown = self.choices.shown ^ {LABEL_OF_NAME[name]}
-            self._page.show_queue()
-            self._shell.remember(memory.tastes(self.choices))
 
     def toggle_swipe(self) -> None:
         """Before over after, or side by side."""

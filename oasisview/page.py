@@ -5,23 +5,24 @@ Callers hold the inspector's lock.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import viser
 
 from oasisview.catalogue import changed_labels
 from oasisview.matrix_window import MatrixWindow
-from oasisview.panels import queue
+from oasisview.panels import journal, queue
 from oasisview.panels.band import band_html
 from oasisview.panels.evidence import evidence_html
 from oasisview.panels.export import export_html
 from oasisview.panels.hud import Layers, hud_html, legend_html, who_html
-from oasisview.panels.journal import journal_html
 from oasisview.panels.matrix import matrix_html
+from oasisview.panels.queue_tools import queue_tools_html
+from oasisview.queue_filter import QueueFilter, queue_order
 from oasisview.shell import Shell
 from oasisview.what_if_panel import WhatIfPanel
 from oasisview.workbench import Workbench
-from pipeline.result import ChangeLabel
+from pipeline.result import ChangeLabel, MapObject
 
 
 @dataclass
@@ -42,6 +43,10 @@ class Choices:
     cell: tuple[int, int] | None = None
     matrix_window: MatrixWindow = field(default_factory=MatrixWindow)
     belief: int | None = None  # the moment of the later visit that is looked back at
+    queue: QueueFilter = field(default_factory=QueueFilter)
+    skipped: tuple[int, ...] = ()
+    journal_mine: bool = False
+    journal_length: int = journal.PAGE_LENGTH
     pending_label: tuple[int, ChangeLabel] | None = None
     conflict: str = ""
     export_status: str = ""
@@ -79,6 +84,7 @@ class Page:
         gui.set_panel_label(self._bench.name)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Queue"):
+            self._queue_tools = gui.add_html("")
             self._queue = gui.add_html("")
         self.what_if = WhatIfPanel(gui, tabs.add_tab("What-if"))
         with tabs.add_tab("Journal"):
@@ -100,7 +106,29 @@ class Page:
 
     def show_queue(self) -> None:
         """The list of objects."""
-        self._queue.content = queue.queue_html(self._catalogue, self._decisions.verdicts, self.choices.shown)
+        decisions = self._decisions
+        self._queue.content = queue.queue_html(
+            self._catalogue,
+            decisions.verdicts,
+            replace(self.choices.queue, labels=self.choices.shown),
+            skipped=self.choices.skipped,
+            disputed=decisions.disagreements.keys(),
+            dropped=decisions.corrected.dropped,
+        )
+
+    def show_queue_tools(self) -> None:
+        """Search and filters of the queue, as they are chosen."""
+        self._queue_tools.content = queue_tools_html(self.choices.queue)
+
+    def queue_order(self) -> list[MapObject]:
+        """The objects that the queue lists, from top to bottom."""
+        return queue_order(
+            self._catalogue.by_doubt(),
+            self._decisions.verdicts,
+            replace(self.choices.queue, labels=self.choices.shown),
+            skipped=self.choices.skipped,
+            disputed=self._decisions.disagreements.keys(),
+        )
 
     def show_evidence(self) -> None:
         """Why the selected object has its label; what is shown counts as seen."""
@@ -108,6 +136,7 @@ class Page:
         # What is on the screen is what a decision is based on: newer ones of others are a conflict.
         self.seen_event_id = self._decisions.last_event_id
         selected = choices.selected
+        entry = self._decisions.corrected.objects.get(selected) if selected is not None else None
         self._evidence.content = evidence_html(
             self._catalogue,
             selected,
@@ -116,6 +145,7 @@ class Page:
             belief=choices.belief,
             can_undo=self._decisions.can_undo(self._shell.user),
             can_redo=self._decisions.can_redo(self._shell.user),
+            pieces=len(entry.machine_ids) if entry is not None else 1,
             conflict=choices.conflict or self._decisions.disagreement(selected),
         )
 
@@ -128,7 +158,15 @@ class Page:
 
     def show_journal(self) -> None:
         """The list of decisions."""
-        self._journal.content = journal_html(self._decisions.history())
+        choices, decisions = self.choices, self._decisions
+        self._journal.content = journal.journal_html(
+            decisions.history(),
+            decisions.corrected.machine,
+            decisions.undone,
+            user=self._shell.user,
+            mine=choices.journal_mine,
+            shown=choices.journal_length,
+        )
 
     def show_export(self) -> None:
         """What can be downloaded."""

@@ -50,6 +50,8 @@ SHELL_KEYS = (
     ("X", "swipe between before and after"),
     ("H", "see the whole site"),
     ("M", "write a note"),
+    ("/", "find an object by its number"),
+    (".", "skip: decide on this object later"),
     ("?", "these keys"),
     ("Esc", "close"),
     ("W A S D Q E, arrows", "move the camera"),
@@ -116,7 +118,8 @@ class Shell:
             "maxText": events.MAX_TEXT_LENGTH,
         }
         self._run(
-            f"({_script('shell.js')})({json.dumps(options)});({_script('dialogs.js')})();({_script('grid.js')})()"
+            f"({_script('shell.js')})({json.dumps(options)});"
+            + ";".join(f"({_script(name)})()" for name in ("dialogs.js", "grid.js", "review.js"))
         )
 
     @staticmethod
@@ -228,6 +231,18 @@ class Shell:
     def ask_text(self, title: str, hint: str, text: str, kind: str) -> None:
         """Open a dialog with a text to be changed or left as it is, and send it as an event of that kind."""
         self._call("askText", title, hint, text, kind)
+
+    def confirm(self, title: str, text: str, buttons: Mapping[str, str]) -> None:
+        """Open a dialog that says what will happen, with room for a reason.
+
+        It sends ``confirmed``, ``{"choice": a key of buttons, "reason": text}``; the last button is the main
+        one. Closing it sends nothing.
+        """
+        self._call("confirm", title, text, list(buttons.items()))
+
+    def set_picking(self, text: str) -> None:
+        """Show what to click next until the text is empty again; Esc sends ``end_pick``."""
+        self._call("setPicking", text)
 
     def close(self) -> None:
         """Stop handling events; call when the client disconnects."""

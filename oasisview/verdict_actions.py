@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import threading
-from typing import Protocol
 
 from oasisview import wording
+from oasisview.correction_words import event_words
 from oasisview.page import Page
-from oasisview.panels import queue
-from oasisview.review import ConflictError, Decision
+from oasisview.queue_actions import SelectObject
+from oasisview.queue_filter import next_to_review
+from oasisview.review import CORRECTIONS, ConflictError, Decision, Kind
 from oasisview.shell import Shell
 from oasisview.wording import LABEL_NAMES
 from oasisview.workbench import Workbench
 from pipeline.result import ChangeLabel, MapObject
-
-
-class SelectObject(Protocol):
-    """Shows an object everywhere (``Inspector.select``)."""
-
-    def __call__(self, object_id: int | None, *, fly: bool = False) -> None:
-        """Show it; ``fly`` moves the camera there."""
 
 
 class VerdictActions:
@@ -36,7 +30,6 @@ class VerdictActions:
     ) -> None:
         self._shell = shell
         self._page = page
-        self._objects = bench.catalogue.objects
         self._catalogue = bench.catalogue
         self._decisions = bench.decisions
         self._choices = page.choices
@@ -98,15 +91,22 @@ class VerdictActions:
 
     def _selected(self) -> MapObject | None:
         chosen = self._choices.selected
-        return self._objects.get(chosen) if chosen is not None else None
+        return self._catalogue.objects.get(chosen) if chosen is not None else None
 
     def _turn(self, decision: Decision | None, done: str, nothing: str) -> None:
         if decision is None:
             self._shell.toast(nothing)
             return
-        label = LABEL_NAMES[self._decisions.label_of(decision.object_id)]
-        self._shell.toast(f"{done}: {wording.object_name(decision.object_id)} is {label}.")
-        self._select(decision.object_id, fly=decision.object_id != self._choices.selected)
+        state = self._decisions.corrected
+        object_id = state.present_id(decision.object_id)
+        if decision.kind in (*CORRECTIONS, Kind.RESTORE):
+            event = self._decisions.history()[decision.event_id - 1]
+            self._shell.toast(f"{done}: {event_words(event, state.machine)}.")
+        else:
+            label = LABEL_NAMES[self._decisions.label_of(object_id or 0)]
+            self._shell.toast(f"{done}: {wording.object_name(object_id or decision.object_id)} is {label}.")
+        if object_id is not None:
+            self._select(object_id, fly=object_id != self._choices.selected)
 
     def _store_pending(self, reason: str) -> None:
         pending, self._choices.pending_label = self._choices.pending_label, None
@@ -127,11 +127,12 @@ class VerdictActions:
             self._choices.conflict = str(conflict)
             self._page.show_evidence()
             return
-        order = queue.queue_order(self._catalogue, self._decisions.verdicts, self._choices.shown)
-        did = "accepted as" if label is self._objects[object_id].label else "set to"
+        order = self._page.queue_order()
+        item = self._catalogue.objects.get(object_id)
+        did = "accepted as" if item is not None and label is item.label else "set to"
         name = wording.object_name(object_id).capitalize()
         self._shell.toast(f"Saved: {name} {did} {LABEL_NAMES[decision.new_label]}.", undo=True)
-        following = queue.next_to_review(order, self._decisions.verdicts, None)
+        following = next_to_review(order, self._decisions.verdicts, None)
         if following is not None:
             self._select(following, fly=True)
         else:

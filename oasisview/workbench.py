@@ -21,8 +21,12 @@ class Workbench:
     def __init__(self, result: Result, assets: AssetTable) -> None:
         self.result = result
         self.catalogue = Catalogue(result, assets)
-        self.points: MapPoints = load_map_points(result)
+        self._machine_points = load_map_points(result)
+        self.points: MapPoints = self._machine_points
         self.decisions = SharedDecisions(result)
+        self._follow_corrections()
+        # Before any page: what pages draw from has to be corrected when they hear of it.
+        self.decisions.subscribe(lambda _: self._follow_corrections())
         self.name = result.path.stem
         self._present: dict[int, str] = {}
         self._watchers: list[Callable[[], None]] = []
@@ -51,6 +55,14 @@ class Workbench:
     def close(self) -> None:
         """Let go of the files."""
         self.decisions.close()
+
+    def _follow_corrections(self) -> None:
+        corrected = self.decisions.corrected
+        self.catalogue.follow(corrected)
+        points = self._machine_points
+        if corrected.is_corrected:
+            points = points.with_objects(tuple(map(corrected.table, range(len(points.visits)))))
+        self.points = points
 
     def _tell(self) -> None:
         with self._lock:

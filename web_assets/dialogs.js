@@ -124,6 +124,7 @@
   }, true);
 
   Object.assign(oasis, {
-    askReason, askText, help, open, addKey: (key, meaning) => { known().push([key, meaning]); },
+    askReason, askText, help, open, form, shut, button,
+    addKey: (key, meaning) => { known().push([key, meaning]); },
   });
 })

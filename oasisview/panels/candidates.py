@@ -47,6 +47,8 @@ def candidates(catalogue: Catalogue, item: MapObject, limit: int = SHOWN) -> lis
         return []
     found: list[Candidate] = []
     for index in np.argsort(-np.asarray(sigma, np.float64), kind="stable"):
+        if others[index] == 0:  # people said that it is no object
+            continue
         chosen = int(others[index]) == item.object_id
         if sigma[index] > 0 or chosen:
             found.append(Candidate(int(others[index]), float(sigma[index]), float(s_bar[index]), chosen))

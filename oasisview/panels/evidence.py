@@ -28,9 +28,13 @@ def evidence_html(
     belief: int | None = None,
     can_undo: bool = False,
     can_redo: bool = False,
+    pieces: int = 1,
     conflict: str = "",
 ) -> str:
-    """The whole panel for the selected object, or what to do where none is selected."""
+    """The whole panel for the selected object, or what to do where none is selected.
+
+    ``pieces`` tells of how many of the machine's objects it is made.
+    """
     item = catalogue.objects.get(object_id) if object_id is not None else None
     if item is None:
         hint = empty(wording.NOTHING_SELECTED if catalogue.objects else wording.NO_OBJECTS)
@@ -50,7 +54,7 @@ def evidence_html(
     return (
         f'<div class="oa oa-evidence" data-evidence="{item.object_id}">'
         f'<div class="oa-evidence-body">{"".join(body)}</div>'
-        f"{verdict_html(item, verdict, can_undo=can_undo, can_redo=can_redo)}</div>"
+        f"{verdict_html(item, verdict, can_undo=can_undo, can_redo=can_redo, pieces=pieces)}</div>"
     )
 
 
@@ -69,11 +73,20 @@ def _title(item: MapObject, label: ChangeLabel, verdict: Verdict | None) -> str:
 def _why(item: MapObject, label: ChangeLabel, verdict: Verdict | None, limits: Limits) -> str:
     said = ""
     if verdict is not None and not verdict.accepted:
-        said = f"<b>{escape(wording.overridden(verdict.label, item.label, verdict.who))}</b> "
+        said = f"<b>{escape(_said(item, verdict))}</b> "
     if verdict is not None and verdict.reason:
         said += f"<q>{escape(verdict.reason)}</q> "
     reason = escape(wording.why(item, limits))
     return f'<p class="oa-why oa-{LABEL_NAMES[label]}" data-role="why">{said}{reason}</p>'
+
+
+def _said(item: MapObject, verdict: Verdict) -> str:
+    if not verdict.correction:
+        return wording.overridden(verdict.label, item.label, verdict.who)
+    label = "" if verdict.label is item.label else f", {LABEL_NAMES[verdict.label]}"
+    return (
+        f"Corrected: {verdict.correction}{label} ({verdict.who}). What the machine saw of its largest piece:"
+    )
 
 
 def _numbers(item: MapObject, limits: Limits) -> str:

@@ -1,17 +1,17 @@
-"""Who decided what, when and why: the journal as a list, newest first."""
+"""Who decided what, when and why: the journal as a list, newest first, each a state to return to."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from datetime import datetime
 
 from oasisview import wording
+from oasisview.correction_words import event_words
 from oasisview.panels.markup import chip, empty, sends
-from oasisview.review import Event, Kind
+from oasisview.review import Event, Kind, MachineMap
 from oasisview.shell import escape
-from oasisview.wording import LABEL_NAMES
 
-SHOWN = 300
+PAGE_LENGTH = 200
 
 
 def when(at: str) -> str:
@@ -22,49 +22,75 @@ def when(at: str) -> str:
         return at
 
 
-def journal_html(events: Sequence[Event]) -> str:
-    """The panel; undone decisions are struck through."""
+def journal_html(
+    events: Sequence[Event],
+    machine: MachineMap,
+    undone: Collection[int] = (),
+    *,
+    user: str = "",
+    mine: bool = False,
+    shown: int = PAGE_LENGTH,
+) -> str:
+    """The panel.
+
+    Args:
+        events: the whole journal, oldest first.
+        machine: what the events are about.
+        undone: decisions that do not count at present; struck through.
+        user, mine: whose page it is, and whether it lists that person's entries only.
+        shown: most entries to list; a button asks for more.
+    """
     if not events:
         return f'<div class="oa oa-journal">{empty(wording.NO_DECISIONS)}</div>'
-    undone: set[int] = set()
-    for event in events:
-        if event.target_id is not None:
-            (undone.add if event.kind is Kind.UNDO else undone.discard)(event.target_id)
-    rows = "".join(_row(event, struck=event.id in undone) for event in reversed(events[-SHOWN:]))
-    entries = "1 entry" if len(events) == 1 else f"{len(events)} entries"
-    older = len(events) - SHOWN
-    more = f'<div class="oa-note">{older} older entries are in review.sqlite.</div>' if older > 0 else ""
+    listed = [event for event in events if not mine or event.who == user]
+    rows = "".join(
+        _row(event, machine, events, is_undone=event.id in undone, is_last=event.id == len(events))
+        for event in reversed(listed[-shown:])
+    )
+    entries = "1 entry" if len(listed) == 1 else f"{len(listed)} entries"
+    older = len(listed) - shown
+    end = (
+        f'<button class="oa-more" {sends("journal_more")}>Show older entries ({older} more)</button>'
+        if older > 0
+        else _beginning()
+    )
     return (
-        f'<div class="oa oa-journal"><div class="oa-note">{entries}, newest first. '
-        f"Nothing is ever removed; undo is an entry too.</div>{rows}{more}</div>"
+        f'<div class="oa oa-journal">{_whose(mine=mine)}<div class="oa-note">{entries}, newest first. '
+        f"Nothing is ever removed; undo is an entry too.</div>{rows}{end}</div>"
     )
 
 
-def parts(count: int) -> str:
-    """How much a decision about many objects is about."""
-    return f"{count} thing{'' if count == 1 else 's'}"
+def _whose(*, mine: bool) -> str:
+    buttons = "".join(
+        f'<button aria-pressed="{str(mine == is_mine).lower()}" {sends("journal_who", value)}>{word}</button>'
+        for value, word, is_mine in (("all", "Everybody's", False), ("mine", "Mine", True))
+    )
+    return f'<span class="oa-segments" role="group" aria-label="Whose entries">{buttons}</span>'
 
 
-def _row(event: Event, *, struck: bool) -> str:
-    new, old = LABEL_NAMES[event.new_label], LABEL_NAMES[event.old_label]
-    what = {
-        Kind.ACCEPT: f"accepted as {new}",
-        Kind.LABEL: f"{old} \u2192 {new}",
-        Kind.NOTE: "note",
-        Kind.UNDO: f"undone, {new} again",
-        Kind.REDO: f"redone, {new} again",
-        Kind.MERGE: f"merged with others, now {new}",
-        Kind.SAME: f"the same as another, now {new}",
-        Kind.SPLIT: f"not one object, now {new}",
-        Kind.DROP: "not an object",
-        Kind.KEEP: "an object after all",
-        Kind.RESTORE: "an earlier state restored",
-        Kind.WHAT_IF: f"and others by other limits ({parts(len(event.groups))})",
-    }[event.kind]
-    reason = f"<q>{escape(event.why)}</q>" if event.why else ""
+def _beginning() -> str:
     return (
-        f'<div class="oa-entry{" oa-undone" if struck else ""}" role="button" tabindex="0" '
-        f'data-event="{event.id}" {sends("select", max(event.object_id, 1))}>{chip(event.new_label)}'
-        f"<span><b>{f'#{event.object_id}' if event.object_id else 'All'}</b> {what}{reason}"
-        f"<small>{escape(event.who)} \u00b7 {escape(when(event.at))}</small></span></div>"
+        '<div class="oa-entry oa-first"><span></span><span>What the machine found'
+        f"{_restore_button(0, 'Go back to what the machine found')}</span></div>"
+    )
+
+
+def _restore_button(event_id: int, tip: str) -> str:
+    return f'<button class="oa-restore" {sends("restore", event_id)} title="{tip}">back to here</button>'
+
+
+def _row(
+    event: Event, machine: MachineMap, events: Sequence[Event], *, is_undone: bool, is_last: bool
+) -> str:
+    target = events[event.target_id - 1] if event.target_id and event.kind in (Kind.UNDO, Kind.REDO) else None
+    reason = f"<q>{escape(event.why)}</q>" if event.why else ""
+    number = f"<b>#{event.object_id}</b> " if event.object_id else ""
+    select = sends("select", event.object_id) if event.object_id else ""
+    back = "" if is_last else _restore_button(event.id, f"Go back to how it was after entry {event.id}")
+    return (
+        f'<div class="oa-entry{" oa-undone" if is_undone else ""}" role="button" tabindex="0" '
+        f'data-event="{event.id}" {select}>{chip(event.new_label)}'
+        f'<span><span class="oa-what">{number}{escape(event_words(event, machine, target))}{reason}</span>'
+        f"<small>{event.id} \u00b7 {escape(event.who)} \u00b7 {escape(when(event.at))}{back}</small></span>"
+        "</div>"
     )

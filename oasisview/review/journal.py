@@ -9,13 +9,14 @@ the disk.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from oasisview.review import database
 from oasisview.review.corrected_map import CorrectedMap, CorrectedObject
 from oasisview.review.corrected_result import CorrectedResult
+from oasisview.review.disagreement import Opinion, disagreements
 from oasisview.review.events import CORRECTIONS, ConflictError, Decision, Event, FinalLabel, Kind
 from oasisview.review.fragments import Group, Members, all_members
 from oasisview.review.journal_file import JournalFile
@@ -26,6 +27,21 @@ from pipeline.errors import InputError
 from pipeline.result import ChangeLabel, Result
 
 REVIEW_FILE = "review.sqlite"
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """What follows from the decisions.
+
+    Attributes:
+        corrected: the map with all of them applied.
+        disagreements: opinions that contradict each other, by object id.
+        undone: numbers of the decisions that do not count.
+    """
+
+    corrected: CorrectedMap
+    disagreements: Mapping[int, tuple[Opinion, ...]]
+    undone: frozenset[int]
 
 
 class Journal(JournalFile):
@@ -176,6 +192,16 @@ class Journal(JournalFile):
     def corrected(self) -> CorrectedMap:
         """The map with all decisions applied."""
         return self._asked(Replay.state)
+
+    def snapshot(self) -> Snapshot:
+        """Everything that follows from the decisions, as of one moment."""
+        return self._asked(
+            lambda replay: Snapshot(
+                replay.state(),
+                disagreements(replay.state(), replay.standing_events()),
+                frozenset(d.event_id for d in replay.decisions() if d.undone),
+            )
+        )
 
     def final_labels(self) -> dict[int, FinalLabel]:
         """Final label of every object of the corrected map."""

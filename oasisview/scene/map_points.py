@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import colorsys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +68,14 @@ class MapPoints:
         local = np.array(T_world_camera, np.float64)
         local[:3, 3] -= self.origin
         return local
+
+    def with_objects(self, tables: tuple[NDArray[np.int32], ...]) -> MapPoints:
+        """The same points with other object ids: of every visit, the new id by the present one."""
+        visits = tuple(
+            replace(visit, object_ids=table[visit.object_ids])
+            for visit, table in zip(self.visits, tables, strict=True)
+        )
+        return replace(self, visits=visits)
 
     def obstacles_world(self, visit: int) -> NDArray[np.float64]:
         """A sample of what can stand before a camera in a visit, (N, 3) world, metres; no ceiling."""
@@ -170,6 +178,9 @@ def object_colours(
     paint = np.zeros((len(known), 3), np.float32)
     strength = np.full((len(known), 1), 0.8, np.float32)
     for row, object_id in enumerate(known):
+        if object_id == 0:  # people said that it is no object
+            strength[row] = 0.0
+            continue
         if mode == "identity":
             paint[row] = identity_rgb(int(object_id))
             continue

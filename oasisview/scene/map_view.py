@@ -119,6 +119,11 @@ class MapView:
         self._labels = labels or self._decided
         self.recolour()
 
+    def follow(self, points: MapPoints) -> None:
+        """The map as corrected: points that belong to other objects, and new labels."""
+        self._points = points
+        self.recolour()
+
     def recolour(self) -> None:
         """Follow changed labels: objects, their boxes, and what is shown of the earlier visit."""
         with self._client.atomic():

@@ -122,9 +122,12 @@ class Marks:
             gone, new = (self._catalogue.objects.get(i) for i in (event.disappeared_id, event.appeared_id))
             if gone is None or new is None or self._mode == "before":
                 continue
-            stands = [self._label_of(item.object_id) is item.label for item in (gone, new)]
+            if self._label_of(gone.object_id) is not ChangeLabel.DISAPPEARED:
+                continue
+            if self._label_of(new.object_id) is not ChangeLabel.APPEARED:
+                continue
             first, second = gone.sighting(0), new.sighting(1)
-            if all(stands) and first is not None and second is not None:
+            if first is not None and second is not None:
                 low = np.minimum(first.box_min_world_m, second.box_min_world_m) - self._points.origin
                 high = np.maximum(first.box_max_world_m, second.box_max_world_m) - self._points.origin
                 edges.append(outlines.dashed(outlines.box_segments(low, high, 0.03), 0.06))

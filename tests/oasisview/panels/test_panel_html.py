@@ -9,7 +9,7 @@ import pytest
 
 from oasisview import wording
 from oasisview.assets import AssetTable
-from oasisview.catalogue import Catalogue, changed_labels
+from oasisview.catalogue import Catalogue
 from oasisview.decisions import Verdict
 from oasisview.job import JobState
 from oasisview.panels import queue
@@ -21,7 +21,8 @@ from oasisview.panels.hud import COLOURS, Layers, hud_html, legend_html, who_htm
 from oasisview.panels.journal import journal_html
 from oasisview.panels.matrix import cell_at, matrix_html
 from oasisview.panels.progress import progress_html
-from oasisview.review import Event, Kind
+from oasisview.queue_filter import QueueFilter, next_to_review, queue_order, step
+from oasisview.review import Event, Kind, MachineMap
 from pipeline.progress import STAGES, ProgressEvent
 from pipeline.result import ChangeLabel, MatchCase, Result
 
@@ -73,39 +74,39 @@ def verdict(label: ChangeLabel, *, accepted: bool = False, reason: str = "") -> 
 
 
 def test_the_queue_lists_changes_by_doubt_and_keeps_what_was_decided(catalogue: Catalogue) -> None:
-    shown = changed_labels()
-    order = [item.object_id for item in queue.queue_order(catalogue, {}, shown)]
+    shown = QueueFilter()
+    order = [item.object_id for item in queue_order(catalogue.by_doubt(), {}, shown)]
     assert set(order) == {4, 5, 6, 7, 8, 9, 10, 11, 12}
     assert set(order[:2]) == {10, 11}
     doubts = [catalogue.doubt(catalogue.objects[i]) for i in order[2:]]
     assert doubts == sorted(doubts, reverse=True)
     decided = {10: verdict(ChangeLabel.STATIC), 1: verdict(ChangeLabel.STATIC, accepted=True)}
-    later = [item.object_id for item in queue.queue_order(catalogue, decided, shown)]
+    later = [item.object_id for item in queue_order(catalogue.by_doubt(), decided, shown)]
     assert set(later) == set(order) | {1} and set(later[-2:]) == {10, 1}
 
 
 def test_queue_counts_filters_and_verdicts_are_shown(catalogue: Catalogue) -> None:
     decided = {12: verdict(ChangeLabel.STATIC), 6: verdict(ChangeLabel.APPEARED, accepted=True)}
-    html = checked(queue.queue_html(catalogue, decided, changed_labels()))
-    assert "2 of 9 reviewed" in html and "1 overridden" in html
+    html = checked(queue.queue_html(catalogue, decided, QueueFilter()))
+    assert "2 of 9 decided" in html and "1 corrected" in html
     assert re.search(r'aria-pressed="false"[^>]*aria-label="static: 3"', html)
     assert html.count('class="oa-row') == 9 and html.count("oa-row oa-done") == 2
-    nothing = checked(queue.queue_html(catalogue, {}, frozenset()))
+    nothing = checked(queue.queue_html(catalogue, {}, QueueFilter(frozenset())))
     assert wording.NOTHING_IN_QUEUE in nothing
     everything = {i: verdict(item.label, accepted=True) for i, item in catalogue.objects.items()}
-    assert "All 12 reviewed" in queue.queue_html(catalogue, everything, changed_labels())
+    assert "All 12 decided" in queue.queue_html(catalogue, everything, QueueFilter())
 
 
 def test_stepping_goes_around_and_on_to_what_is_undecided(catalogue: Catalogue) -> None:
-    order = queue.queue_order(catalogue, {}, changed_labels())
+    order = queue_order(catalogue.by_doubt(), {}, QueueFilter())
     ids = [item.object_id for item in order]
-    assert queue.step(order, None, 1) == ids[0] and queue.step(order, None, -1) == ids[-1]
-    assert queue.step(order, ids[-1], 1) == ids[0] and queue.step(order, ids[0], -1) == ids[-1]
-    assert queue.step([], 3, 1) is None
+    assert step(order, None, 1) == ids[0] and step(order, None, -1) == ids[-1]
+    assert step(order, ids[-1], 1) == ids[0] and step(order, ids[0], -1) == ids[-1]
+    assert step([], 3, 1) is None
     decided = {i: verdict(ChangeLabel.STATIC) for i in ids[:3]}
-    assert queue.next_to_review(order, decided, None) == ids[3]
-    assert queue.next_to_review(order, decided, ids[-1]) == ids[3]
-    assert queue.next_to_review(order, dict.fromkeys(ids, decided[ids[0]]), None) is None
+    assert next_to_review(order, decided, None) == ids[3]
+    assert next_to_review(order, decided, ids[-1]) == ids[3]
+    assert next_to_review(order, dict.fromkeys(ids, decided[ids[0]]), None) is None
 
 
 @pytest.mark.parametrize("swipe", [False, True])
@@ -131,7 +132,7 @@ def test_what_people_wrote_is_escaped(catalogue: Catalogue) -> None:
     assert html.count("&lt;script&gt;") == 4
     event = Event(1, "2026-03-10T08:00:00.000+00:00", NASTY, Kind.LABEL, 12, ChangeLabel.APPEARED,
                   ChangeLabel.STATIC, NASTY, None)  # fmt: skip
-    checked(journal_html([event]))
+    checked(journal_html([event], MachineMap.of_labels({})))
     checked(export_html(1, 3, NASTY))
     checked(who_html(NASTY, [NASTY], NASTY))
     checked(progress_html(JobState(warnings=(NASTY,), error=NASTY), [NASTY], 3.0))
@@ -170,7 +171,7 @@ def test_a_keyframe_without_counterpart_says_so(catalogue: Catalogue, monkeypatc
 
 
 def test_every_picture_named_by_the_panels_can_be_fetched(catalogue: Catalogue, assets: AssetTable) -> None:
-    html = queue.queue_html(catalogue, {}, frozenset(ChangeLabel))
+    html = queue.queue_html(catalogue, {}, QueueFilter(frozenset(ChangeLabel)))
     html += "".join(evidence_html(catalogue, i, None) for i in catalogue.objects)
     html += band_html(catalogue, 1, 3, 4, lambda i: catalogue.objects[i].label, dark=True)
     html += matrix_html(catalogue, "sigma", None, (0, 0)) + matrix_html(catalogue, "s_bar", 4, None)
@@ -218,10 +219,11 @@ def test_journal_strikes_out_what_was_undone() -> None:
     label = Event(1, at, "ann", Kind.LABEL, 12, ChangeLabel.APPEARED, ChangeLabel.STATIC, "", None)
     undo = Event(2, at, "ann", Kind.UNDO, 12, ChangeLabel.STATIC, ChangeLabel.APPEARED, "", 1)
     redo = Event(3, at, "ann", Kind.REDO, 12, ChangeLabel.APPEARED, ChangeLabel.STATIC, "", 1)
-    assert "oa-undone" not in checked(journal_html([label]))
-    assert checked(journal_html([label, undo])).count("oa-undone") == 1
-    assert "oa-undone" not in journal_html([label, undo, redo])
-    assert wording.NO_DECISIONS in journal_html([])
+    machine = MachineMap.of_labels({12: ChangeLabel.APPEARED})
+    assert "oa-undone" not in checked(journal_html([label], machine))
+    assert checked(journal_html([label, undo], machine, {1})).count("oa-undone") == 1
+    assert "oa-undone" not in journal_html([label, undo, redo], machine)
+    assert wording.NO_DECISIONS in journal_html([], machine)
 
 
 def test_progress_marks_stages_before_at_and_after_the_present_one() -> None:

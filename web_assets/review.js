@@ -1,0 +1,90 @@
+/* Search, skip, picking another object, and the dialog before a correction; extends window.oasis, once per
+   page. */
+(function () {
+  "use strict";
+  const oasis = window.oasis;
+  if (oasis.confirm) return;
+
+  /* ---- confirm ---- */
+
+  const confirm = (title, text, buttons) => {
+    const { made, field, footer } = oasis.form("oa-ask", title, text);
+    field.placeholder = "Why? (kept with your name and the time)";
+    let main = null;
+    buttons.forEach(([choice, words], place) => {
+      const last = place === buttons.length - 1;
+      const pressed = oasis.button(footer, last ? words + " (Ctrl+Enter)" : words, () => {
+        oasis.send("confirmed", { choice, reason: field.value });
+        oasis.shut(made);
+      }, last);
+      if (last) main = pressed;
+    });
+    made.addEventListener("keydown", (event) => {
+      if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) { event.preventDefault(); main.click(); }
+    });
+    made.showModal();
+    field.focus();
+  };
+
+  /* ---- picking another object ---- */
+
+  let picking = false;
+  const setPicking = (text) => {
+    picking = text !== "";
+    const box = oasis.element("oa-picking", "div");
+    box.className = "oa";
+    box.setAttribute("role", "status");
+    box.hidden = !picking;
+    box.textContent = text;
+    if (!picking) return;
+    const end = box.appendChild(document.createElement("button"));
+    end.textContent = "Cancel (Esc)";
+    end.onclick = () => oasis.send("end_pick");
+  };
+
+  /* ---- keys ---- */
+
+  const isTyping = (node) => node instanceof Element &&
+    (node.matches("textarea, select, input:not([type=range]):not([type=checkbox])") || node.isContentEditable);
+  const find = () => {
+    const field = document.querySelector("[data-search]");
+    if (!field) return;
+    if (!field.offsetParent) {
+      const tab = [...document.querySelectorAll("[role=tab]")].find((each) => each.textContent.trim() === "Queue");
+      if (tab) tab.click();
+    }
+    field.focus();
+    field.select();
+  };
+  const typed = (event, field) => {
+    // Otherwise letters and figures would fire viser's commands behind the field.
+    event.stopPropagation();
+    if (event.key === "Enter" && field.hasAttribute("data-enter")) {
+      oasis.send(field.getAttribute("data-enter"), field.value);
+      field.blur();
+    } else if (event.key === "Escape") field.blur();
+  };
+  window.addEventListener("keydown", (event) => {
+    if (document.querySelector("dialog[open]")) return;
+    const target = event.target;
+    if (target instanceof Element && target.matches("[data-search], .oa-filters input, .oa-filters select")) {
+      typed(event, target);
+      return;
+    }
+    if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || isTyping(target)) return;
+    if (event.key === "/") find();
+    else if (event.key === ".") oasis.send("skip");
+    else if (event.key === "Escape" && picking) oasis.send("end_pick");
+    else return;
+    event.preventDefault();
+  }, true);
+  // A menu closes once something was chosen in it, or something else is clicked.
+  document.addEventListener("click", (event) => {
+    document.querySelectorAll("details.oa-correct[open]").forEach((menu) => {
+      const inside = event.target instanceof Element && menu.contains(event.target);
+      if (!inside || event.target.closest("button")) menu.open = false;
+    });
+  });
+
+  Object.assign(oasis, { confirm, setPicking });
+})
