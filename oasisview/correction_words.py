@@ -57,9 +57,9 @@ def event_words(event: Event, machine: MachineMap, target: Event | None = None) 
             many = len(event.groups)
             return f"other limits applied to {many} object{'' if many == 1 else 's'}"
         case Kind.DROP:
-            return f"{_parts_of(event, machine)} is not an object"
+            return f"not an object: {_parts_of(event, machine)}"
         case Kind.KEEP:
-            return f"{_parts_of(event, machine)} is an object after all: {new}"
+            return f"an object after all: {_parts_of(event, machine)} ({new})"
         case Kind.SPLIT:
             return f"not one object but {len(event.groups)}: {_groups(event, machine)}"
         case Kind.SAME:

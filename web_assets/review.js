@@ -46,15 +46,26 @@
 
   const isTyping = (node) => node instanceof Element &&
     (node.matches("textarea, select, input:not([type=range]):not([type=checkbox])") || node.isContentEditable);
+  let finding = null;  // what was typed while the tab with the field was on its way
   const find = () => {
-    const field = document.querySelector("[data-search]");
-    if (!field) return;
-    if (!field.offsetParent) {
-      const tab = [...document.querySelectorAll("[role=tab]")].find((each) => each.textContent.trim() === "Queue");
-      if (tab) tab.click();
-    }
-    field.focus();
-    field.select();
+    const tabs = [...document.querySelectorAll("[role=tab]")];
+    const queue = tabs.find((tab) => tab.textContent.trim() === "Queue");
+    if (queue && queue.getAttribute("aria-selected") !== "true") queue.click();
+    finding = "";
+    let tries = 0;
+    const focus = () => {
+      const field = document.querySelector("[data-search]");
+      if ((!field || !field.offsetParent) && ++tries < 60) { requestAnimationFrame(focus); return; }
+      const early = finding;
+      finding = null;
+      if (!field) return;
+      field.focus();
+      field.select();
+      if (!early) return;
+      field.value = early;
+      field.dispatchEvent(new Event("input", { bubbles: true }));
+    };
+    focus();
   };
   const typed = (event, field) => {
     // Otherwise letters and figures would fire viser's commands behind the field.
@@ -66,6 +77,12 @@
   };
   window.addEventListener("keydown", (event) => {
     if (document.querySelector("dialog[open]")) return;
+    if (finding !== null) {
+      event.stopImmediatePropagation();
+      event.preventDefault();
+      if (event.key.length === 1) finding += event.key;
+      return;
+    }
     const target = event.target;
     if (target instanceof Element && target.matches("[data-search], .oa-filters input, .oa-filters select")) {
       typed(event, target);

@@ -77,16 +77,16 @@ def _why(item: MapObject, label: ChangeLabel, verdict: Verdict | None, limits: L
     if verdict is not None and verdict.reason:
         said += f"<q>{escape(verdict.reason)}</q> "
     reason = escape(wording.why(item, limits))
+    if verdict is not None and verdict.correction:
+        reason = f"What the machine saw: {reason}"
     return f'<p class="oa-why oa-{LABEL_NAMES[label]}" data-role="why">{said}{reason}</p>'
 
 
 def _said(item: MapObject, verdict: Verdict) -> str:
     if not verdict.correction:
         return wording.overridden(verdict.label, item.label, verdict.who)
-    label = "" if verdict.label is item.label else f", {LABEL_NAMES[verdict.label]}"
-    return (
-        f"Corrected: {verdict.correction}{label} ({verdict.who}). What the machine saw of its largest piece:"
-    )
+    label = "" if verdict.label is item.label else f" But set to {LABEL_NAMES[verdict.label]}."
+    return f"Corrected by {verdict.who}: {verdict.correction}.{label}"
 
 
 def _numbers(item: MapObject, limits: Limits) -> str:

@@ -70,7 +70,7 @@ def _whose(*, mine: bool) -> str:
 
 def _beginning() -> str:
     return (
-        '<div class="oa-entry oa-first"><span></span><span>What the machine found'
+        '<div class="oa-first"><span></span><span>What the machine found'
         f"{_restore_button(0, 'Go back to what the machine found')}</span></div>"
     )
 
@@ -84,7 +84,9 @@ def _row(
 ) -> str:
     target = events[event.target_id - 1] if event.target_id and event.kind in (Kind.UNDO, Kind.REDO) else None
     reason = f"<q>{escape(event.why)}</q>" if event.why else ""
-    number = f"<b>#{event.object_id}</b> " if event.object_id else ""
+    subject = target or event
+    named = subject.kind in (Kind.LABEL, Kind.ACCEPT, Kind.NOTE)  # the others name what they are about
+    number = f"<b>#{event.object_id}</b> " if named else ""
     select = sends("select", event.object_id) if event.object_id else ""
     back = "" if is_last else _restore_button(event.id, f"Go back to how it was after entry {event.id}")
     return (
