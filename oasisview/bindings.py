@@ -29,6 +29,7 @@ def bind(inspector: Inspector, shell: Shell) -> None:
     inspector.matrix.bind()
     inspector.what_if.bind()
     inspector.belief.bind()
+    inspector.patches.bind()
     _add_commands(inspector, shell)
 
 

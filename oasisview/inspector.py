@@ -22,6 +22,7 @@ from oasisview.export_actions import ExportActions
 from oasisview.map_controls import MapControls
 from oasisview.matrix_actions import MatrixActions
 from oasisview.page import Choices, Page
+from oasisview.patch_actions import PatchActions
 from oasisview.preview import Preview
 from oasisview.queue_actions import QueueActions
 from oasisview.scene.map_points import LABEL_RGB
@@ -75,6 +76,7 @@ class Inspector:
         self.corrections = CorrectionActions(shell, self._page, bench, self._lock, self.select)
         self.queue = QueueActions(shell, self._page, bench, self._lock, self.select)
         self.matrix = MatrixActions(shell, self._page, bench, self._lock)
+        self.patches = PatchActions(shell, self._page, bench, self._lock, self._show_band)
         self.preview = Preview(shell, self._map, self._lock)
         self.belief = BeliefActions(shell, self._page, bench, self.preview, self._lock, self.show_keyframe)
         self.what_if = WhatIfActions(shell, self._page, bench, self.preview, self._lock)
@@ -229,10 +231,15 @@ class Inspector:
         if click.session > 1 or click.keyframe >= len(self._catalogue.session(click.session).keyframes):
             return
         found = object_at(self._catalogue.mask(click.session, click.keyframe), click.u, click.v)
-        if found in self._catalogue.objects:
-            self.pick(found, keep_keyframe=True)
-        else:
-            self._shell.toast("No object there.")
+        with self._lock:
+            self.patches.pick(click)
+            if found in self._catalogue.objects:
+                self.pick(found, keep_keyframe=True)
+            else:
+                self._show_band()
+                self._shell.toast(
+                    "No object there: its patch is shown." if self.choices.patch else "No object there."
+                )
 
     def _selected(self) -> MapObject | None:
         chosen = self.choices.selected

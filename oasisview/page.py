@@ -18,6 +18,7 @@ from oasisview.panels.export import export_html
 from oasisview.panels.hud import Layers, hud_html, legend_html, who_html
 from oasisview.panels.matrix import matrix_html
 from oasisview.panels.queue_tools import queue_tools_html
+from oasisview.patch_links import PatchPick
 from oasisview.queue_filter import QueueFilter, queue_order
 from oasisview.shell import Shell
 from oasisview.what_if_panel import WhatIfPanel
@@ -42,6 +43,8 @@ class Choices:
     matrix_kind: str = "sigma"
     cell: tuple[int, int] | None = None
     matrix_window: MatrixWindow = field(default_factory=MatrixWindow)
+    patch: PatchPick | None = None
+    links: bool = False  # the selected object's patch matches are drawn in the band
     belief: int | None = None  # the moment of the later visit that is looked back at
     queue: QueueFilter = field(default_factory=QueueFilter)
     skipped: tuple[int, ...] = ()
@@ -185,6 +188,8 @@ class Page:
             choices.selected,
             self._decisions.label_of,
             dark=choices.dark,
+            pick=choices.patch,
+            with_links=choices.links,
         )
         if whole:
             self._shell.set_html("band", content)

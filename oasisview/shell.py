@@ -57,6 +57,8 @@ SHELL_KEYS = (
     ("W A S D Q E, arrows", "move the camera"),
     ("Ctrl+K", "find a command by its name"),
 )
+# Run in this order after shell.js; each extends window.oasis.
+SCRIPTS = ("dialogs.js", "grid.js", "links.js", "review.js")
 # What a shell key sends, as commands of viser for pages that cannot be extended.
 FALLBACK_COMMANDS = {"swipe": ("Swipe before / after", "X"), "overview": ("See the whole site", "H")}
 
@@ -117,10 +119,8 @@ class Shell:
             "regions": get_args(Region),
             "maxText": events.MAX_TEXT_LENGTH,
         }
-        self._run(
-            f"({_script('shell.js')})({json.dumps(options)});"
-            + ";".join(f"({_script(name)})()" for name in ("dialogs.js", "grid.js", "review.js"))
-        )
+        first = f"({_script('shell.js')})({json.dumps(options)})"
+        self._run(";".join([first, *(f"({_script(name)})()" for name in SCRIPTS)]))
 
     @staticmethod
     def available() -> bool:

@@ -25,6 +25,12 @@ CASE_WORDS: dict[MatchCase, str] = {
     MatchCase.LOOKALIKE: "case 3: looks alike, is not",
     MatchCase.NONE: "case 4: no match",
 }
+LINK_ROLES: dict[str, str] = {
+    "match": "best match of the patch",
+    "rival": "a rival: it claims the patch too",
+    "object": "a patch of the selected object and its best match",
+}
+NOT_COMPARED = "These two keyframes were not compared patch by patch."
 NOTHING_SELECTED = (
     "Click an object in the map, in an image or in the queue, or press J for the most doubtful one."
 )

@@ -11,6 +11,8 @@ from oasisview import crops, wording
 from oasisview.catalogue import Catalogue
 from oasisview.heatmap_colours import CIVIDIS, GEOMETRIC_RANGE_M, geometric_anchors, gradient_css
 from oasisview.panels.markup import empty, key, sends
+from oasisview.panels.patch_overlay import PatchOverlay, patch_overlay
+from oasisview.patch_links import PatchPick
 from oasisview.shell import escape
 from oasisview.wording import LABEL_NAMES
 from pipeline.result import ChangeLabel
@@ -27,8 +29,13 @@ def band_html(
     label_of: LabelOf,
     *,
     dark: bool,
+    pick: PatchPick | None = None,
+    with_links: bool = False,
 ) -> str:
-    """The band for a keyframe of a visit; what changes while scrubbing carries ``data-part``."""
+    """The band for a keyframe of a visit; what changes while scrubbing carries ``data-part``.
+
+    ``pick`` is a patch whose match is shown; ``with_links`` shows the matches of the selected object.
+    """
     visit = catalogue.session(session)
     if not visit.keyframes:
         return f'<div class="oa-band">{empty(f"{visit.name} holds no keyframe.")}</div>'
@@ -36,9 +43,12 @@ def band_html(
     other = 1 - session
     record = visit.keyframes[keyframe]
     this_word, other_word = wording.visit_word(session), wording.visit_word(other)
-    pictures = [
-        _image(catalogue, "this", this_word, f"kf {keyframe + 1}", session, keyframe, selected, label_of)
-    ]
+    overlay = None
+    if pair is not None:
+        shown = (keyframe, pair.other_keyframe) if session == 0 else (pair.other_keyframe, keyframe)
+        overlay = patch_overlay(catalogue, shown, pick, selected if with_links else None)
+    note = f"kf {keyframe + 1}"
+    pictures = [_image(catalogue, "this", this_word, note, session, keyframe, selected, label_of, overlay)]
     if pair is None:
         nothing = f'<div class="oa-pic">{empty(wording.NO_SHARED_VIEW)}</div>'
         titles = {"other": other_word, "semantic": "Looks different", "geometric": "Shape different"}
@@ -46,19 +56,23 @@ def band_html(
     else:
         note = f"kf {pair.other_keyframe + 1} \u00b7 {wording.percent(pair.shared)} shared"
         pictures.append(
-            _image(catalogue, "other", other_word, note, other, pair.other_keyframe, selected, label_of)
+            _image(
+                catalogue, "other", other_word, note, other, pair.other_keyframe, selected, label_of, overlay
+            )
         )
         pictures.append(_heatmap(catalogue, "semantic", session, keyframe, selected, label_of, dark=dark))
         pictures.append(_heatmap(catalogue, "geometric", session, keyframe, selected, label_of, dark=dark))
     title = f"frame {record.frame_index} of the recording, submap {record.submap + 1}"
     return (
         f'<div class="oa-band" data-session="{session}" data-keyframe="{keyframe}">'
-        f"{_scrubber(catalogue, session, keyframe, selected, title)}"
+        f"{_scrubber(catalogue, session, keyframe, selected, title, with_links=with_links)}"
         f'<div class="oa-pictures">{"".join(pictures)}</div></div>'
     )
 
 
-def _scrubber(catalogue: Catalogue, session: int, keyframe: int, selected: int | None, title: str) -> str:
+def _scrubber(
+    catalogue: Catalogue, session: int, keyframe: int, selected: int | None, title: str, *, with_links: bool
+) -> str:
     count = len(catalogue.session(session).keyframes)
     switch = "".join(
         f'<button aria-pressed="{str(session == s).lower()}" {sends("visit", s)} '
@@ -78,7 +92,9 @@ def _scrubber(catalogue: Catalogue, session: int, keyframe: int, selected: int |
         f'<input type="range" min="0" max="{max(count - 1, 0)}" value="{keyframe}" data-part="slider" '
         'data-send="scrub" aria-label="Keyframe"></span>'
         f"{_step(1, 'Next keyframe', 'N', NEXT_SIGN)}"
-        f'<span data-part="step" class="oa-steps"><button {sends("best_view")} title="{best_tip}" '
+        f'<span data-part="step" class="oa-steps"><button {sends("links")} '
+        f'aria-pressed="{str(with_links).lower()}" title="Draw where the selected object\'s patches match">'
+        f'links</button><button {sends("best_view")} title="{best_tip}" '
         f"{'' if selected is not None else 'disabled'}>best view</button>"
         f'<button {sends("fly_keyframe")} title="Move the camera of the map to this keyframe (V)">'
         f"go there {key('V')}</button></span></div>"
@@ -115,15 +131,19 @@ def _image(
     keyframe: int,
     selected: int | None,
     label_of: LabelOf,
+    overlay: PatchOverlay | None,
 ) -> str:
     url = catalogue.image_url(session, keyframe)
     body = _clickable(
         f'<img src="{escape(url)}" alt="{escape(title)}, {escape(note)}" draggable="false">'
-        + _overlay(catalogue, session, keyframe, selected, label_of),
+        + _overlay(catalogue, session, keyframe, selected, label_of)
+        + (overlay.marks(session) if overlay is not None else ""),
         session,
         keyframe,
         catalogue,
     )
+    if overlay is not None and part == "other":
+        body = f'<div class="oa-told">{body}{overlay.words()}</div>'
     return _figure(part, title, note, body, "")
 
 

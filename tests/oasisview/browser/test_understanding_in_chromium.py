@@ -15,6 +15,7 @@ from playwright.sync_api import Page, expect
 
 from oasisview.app import RunningApp, start
 from oasisview.inspector import Inspector
+from oasisview.patch_links import story_of
 from oasisview.scene.map_points import LABEL_RGB
 from pipeline.result import ChangeLabel
 
@@ -242,4 +243,44 @@ def test_belief_is_seen_in_the_strip_and_the_map_follows_slider_and_band(app, vi
     bar.locator("button").click()
     expect(bar).to_be_empty(timeout=PATIENCE_MS)
     view.wait_for(lambda: drawn_like(app, view, 5) is ChangeLabel.MOVED, "what has been decided")
+    assert not page.problems
+
+
+def test_a_clicked_patch_shows_its_match_in_the_other_picture(app, view) -> None:
+    page = view.page
+    page.evaluate("() => O('keyframe', {session: 1, keyframe: 1})")
+    view.wait_js("() => document.querySelector('[data-part=this] figcaption').innerText.includes('kf 2')")
+    catalogue = app.workbench.catalogue
+    pair = (catalogue.covisible(1, 1).other_keyframe, 1)
+    u, v = 0.31, 0.62
+    frame = page.locator('[data-part="this"] .oa-frame').bounding_box()
+    page.mouse.click(frame["x"] + u * frame["width"], frame["y"] + v * frame["height"])
+    words = page.locator('[data-part="other"] .oa-patch-words')
+    expect(words).to_contain_text("Best match", timeout=PATIENCE_MS)
+
+    story = story_of(catalogue.result.links(*pair), 1, u, v)
+    assert f"{story.match.score:.2f}" in words.inner_text()
+    line = page.locator(".oa-lines line.oa-match:not(.oa-under)")
+    expect(line).to_have_count(1, timeout=PATIENCE_MS)
+    other = page.locator('[data-part="other"] .oa-frame').bounding_box()
+    box = page.locator(".oa-pictures").bounding_box()
+    ends = [float(line.get_attribute(name)) for name in ("x1", "y1", "x2", "y2")]
+    (u0, v0), (u1, v1) = story.match.before, story.match.after
+    wanted = [
+        other["x"] - box["x"] + u0 * other["width"], other["y"] - box["y"] + v0 * other["height"],
+        frame["x"] - box["x"] + u1 * frame["width"], frame["y"] - box["y"] + v1 * frame["height"],
+    ]  # fmt: skip
+    assert np.allclose(ends, wanted, atol=1.5)
+    assert page.locator(".oa-lines line.oa-rival:not(.oa-under)").count() == len(story.rivals)
+
+    page.locator('[data-send="patch_clear"]').click()
+    expect(page.locator(".oa-lines")).to_have_count(0, timeout=PATIENCE_MS)
+
+    page.evaluate("() => O('select', 1)")
+    page.wait_for_selector('[data-evidence="1"]')
+    page.evaluate("() => O('best_view')")
+    page.locator('#oa-band [data-send="links"]').click()
+    expect(page.locator(".oa-lines line.oa-object").first).to_be_attached(timeout=PATIENCE_MS)
+    page.locator('#oa-band [data-send="links"]').click()
+    expect(page.locator(".oa-lines")).to_have_count(0, timeout=PATIENCE_MS)
     assert not page.problems
