@@ -150,7 +150,7 @@ def test_applying_is_one_journal_entry_with_the_limits_as_reason_and_one_undo_ta
     decisions = own_app.workbench.decisions
     assert decisions.label_of(7) is ChangeLabel.UNKNOWN and decisions.label_of(8) is ChangeLabel.STATIC
     page.get_by_role("tab", name="Journal").click()
-    expect(page.locator(".oa-entry").first).to_contain_text("by other limits", timeout=PATIENCE_MS)
+    expect(page.locator(".oa-entry").first).to_contain_text("other limits", timeout=PATIENCE_MS)
 
     page.keyboard.press("u")
     view.wait_for(lambda: decisions.label_of(7) is ChangeLabel.APPEARED, "the undo")
