@@ -31,6 +31,7 @@ def bind(inspector: Inspector, shell: Shell) -> None:
     inspector.belief.bind()
     inspector.patches.bind()
     _add_commands(inspector, shell)
+    inspector.tools.bind()
 
 
 def _bind_selection(inspector: Inspector, shell: Shell) -> None:
@@ -59,7 +60,7 @@ def _bind_map(inspector: Inspector, shell: Shell) -> None:
     on("mode", controls.set_mode, events.choice(*MODES))
     on("colours", controls.set_colours, events.choice(*COLOURS))
     on("layer", controls.set_layer, layer)
-    on("theme", controls.set_theme, events.flag)
+    on("theme", inspector.set_theme, events.flag)
     on("overview", lambda _: controls.fly_home())
 
 

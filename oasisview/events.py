@@ -15,7 +15,8 @@ T = TypeVar("T")
 Parser = Callable[[Any], T]
 
 MAX_TEXT_LENGTH = 500  # of what people write: notes and reasons
-OWN_KINDS = frozenset({"hello", "note", "undo", "swipe", "overview"})  # sent by the shell of every page
+# Sent by the shell of every page.
+OWN_KINDS = frozenset({"hello", "note", "undo", "swipe", "overview", "escape"})
 
 
 def nothing(value: Any) -> None:

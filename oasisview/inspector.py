@@ -20,6 +20,7 @@ from oasisview.correction_actions import CorrectionActions
 from oasisview.crops import object_at
 from oasisview.export_actions import ExportActions
 from oasisview.map_controls import MapControls
+from oasisview.map_tools import MapTools
 from oasisview.matrix_actions import MatrixActions
 from oasisview.page import Choices, Page
 from oasisview.patch_actions import PatchActions
@@ -69,10 +70,13 @@ class Inspector:
             bench.points,
             self._decisions.label_of,
             LABEL_RGB,
-            on_object=self.pick,
-            on_keyframe=self.show_keyframe,
+            on_object=lambda found: None if self.tools.tape.active else self.pick(found),
+            on_keyframe=lambda *place: None if self.tools.tape.active else self.show_keyframe(*place),
         )
         self.controls = MapControls(shell, self._page, bench, self._map, self._lock, self._show_band)
+        self.tools = MapTools(
+            client, shell, self._page, bench, self._map, self.controls, self.select, self._lock
+        )
         self.corrections = CorrectionActions(shell, self._page, bench, self._lock, self.select)
         self.queue = QueueActions(shell, self._page, bench, self._lock, self.select)
         self.matrix = MatrixActions(shell, self._page, bench, self._lock)
@@ -109,6 +113,7 @@ class Inspector:
             self._page.show_queue()
             self._page.show_journal()
             self._page.show_export()
+            self.tools.open()
             self.what_if.open()
             linked = hello.object_id if hello is not None else None
             wanted = self._decisions.corrected.present_id(linked) if linked is not None else None
@@ -134,6 +139,7 @@ class Inspector:
         """The tab is gone."""
         self._closed = True
         self.exports.close()
+        self.tools.close()
         self._map.close()
         self._decisions.unsubscribe(self._on_decisions)
         self._bench.leave(self._client.client_id, self._on_presence)
@@ -297,6 +303,11 @@ class Inspector:
         asyncio.run_coroutine_threadsafe(run(), self._loop)
 
     # What is shown
+
+    def set_theme(self, dark: bool) -> None:
+        """Light or dark page."""
+        self.controls.set_theme(dark)
+        self.tools.tape.redraw()
 
     def toggle_swipe(self) -> None:
         """Before over after, or side by side."""

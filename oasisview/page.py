@@ -10,12 +10,14 @@ from dataclasses import dataclass, field, replace
 import viser
 
 from oasisview.catalogue import changed_labels
+from oasisview.map_tools_panel import MapToolsPanel
 from oasisview.matrix_window import MatrixWindow
 from oasisview.panels import journal, queue
 from oasisview.panels.band import band_html
 from oasisview.panels.evidence import evidence_html
 from oasisview.panels.export import export_html
 from oasisview.panels.hud import Layers, hud_html, legend_html, who_html
+from oasisview.panels.map_tools import tools_html
 from oasisview.panels.matrix import matrix_html
 from oasisview.panels.queue_tools import queue_tools_html
 from oasisview.patch_links import PatchPick
@@ -52,6 +54,9 @@ class Choices:
     journal_length: int = journal.PAGE_LENGTH
     pending_label: tuple[int, ChangeLabel] | None = None
     conflict: str = ""
+    measuring: bool = False  # clicks in the map measure
+    tape_hint: str = ""
+    cut: bool = False  # parts of the map are not drawn
     export_status: str = ""
     export_share: float | None = None  # of an export that is being made
 
@@ -80,6 +85,7 @@ class Page:
             self._evidence = gui.add_html("")
         with evidence.add_tab("Matrix"):
             self._matrix = gui.add_html("")
+        self.tools = MapToolsPanel(gui, evidence.add_tab("Map"))
         evidence.dock_right()
         evidence.set_width(420 if wide else 344)
         gui.main_panel.dock_left()
@@ -98,8 +104,11 @@ class Page:
     def show_hud(self) -> None:
         """Switches and legend over the map."""
         choices = self.choices
-        hud = hud_html(choices.mode, choices.colours, choices.layers, dark=choices.dark)
-        self._shell.set_html("hud", hud)
+        hud = hud_html(
+            choices.mode, choices.colours, choices.layers, dark=choices.dark, measuring=choices.measuring
+        )
+        tools = tools_html(choices.tape_hint, cut=choices.cut)
+        self._shell.set_html("hud", hud + tools)
         self._shell.set_html("legend", legend_html(choices.colours, choices.mode))
 
     def show_who(self) -> None:

@@ -53,12 +53,13 @@ SHELL_KEYS = (
     ("/", "find an object by its number"),
     (".", "skip: decide on this object later"),
     ("?", "these keys"),
-    ("Esc", "close"),
+    ("L", "copy a link to what is shown"),
+    ("Esc", "close; one step back while measuring"),
     ("W A S D Q E, arrows", "move the camera"),
     ("Ctrl+K", "find a command by its name"),
 )
 # Run in this order after shell.js; each extends window.oasis.
-SCRIPTS = ("dialogs.js", "grid.js", "links.js", "review.js")
+SCRIPTS = ("dialogs.js", "grid.js", "links.js", "review.js", "sharing.js")
 # What a shell key sends, as commands of viser for pages that cannot be extended.
 FALLBACK_COMMANDS = {"swipe": ("Swipe before / after", "X"), "overview": ("See the whole site", "H")}
 
@@ -176,7 +177,7 @@ class Shell:
         """A keyboard command of this tab, also in viser's palette (ctrl+K).
 
         Handled in order with the events, by the same rules. W A S D Q E and the arrows belong to the
-        camera, and Enter, X, H, M and ? to the shell.
+        camera, and Enter, X, H, M, L and ? to the shell.
         """
         command = self.client.gui.add_command(label, hotkey=hotkey)  # type: ignore[arg-type]
 

@@ -121,6 +121,11 @@ def size(extent_m: tuple[float, float, float]) -> str:
     return " x ".join(f"{side:.2f}" for side in longest_first) + " m"
 
 
+def place(point_world_m: tuple[float, float, float]) -> str:
+    """A place in the world frame, metres to the centimetre."""
+    return "x {:.2f}, y {:.2f}, z {:.2f} m".format(*point_world_m)
+
+
 def object_name(object_id: int) -> str:
     """How an object is called everywhere; embedded perception does not name classes."""
     return f"object #{object_id}"

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from oasisview.assets import AssetTable
 from oasisview.catalogue import Catalogue
 from oasisview.decisions import SharedDecisions
+from oasisview.saved_views import SavedViews
 from oasisview.scene.map_points import MapPoints, load_map_points
 from pipeline.result import Result
 
@@ -27,6 +28,7 @@ class Workbench:
         self._follow_corrections()
         # Before any page: what pages draw from has to be corrected when they hear of it.
         self.decisions.subscribe(lambda _: self._follow_corrections())
+        self.views = SavedViews(result.path)
         self.name = result.path.stem
         self._present: dict[int, str] = {}
         self._watchers: list[Callable[[], None]] = []

@@ -115,9 +115,11 @@
     else if (key === "h") oasis.send("overview");
     else if (key === "m") open("note");
     else if (key === "?") open("help");
+    else if (key === "l") oasis.copyLink();
     else if (key === "Escape") {
       document.querySelectorAll(".oa details[open]").forEach((details) => { details.open = false; });
       oasis.element("oa-toast", "div").classList.remove("oa-shown");
+      oasis.send("escape");
       return;
     } else return;
     event.preventDefault();

@@ -100,9 +100,9 @@ class ReportCards:
         if item.sightings:
             last = item.sightings[-1]
             rows.append(("size", wording.size(last.extent_m)))
-            rows.append(("centre", _position(last.centroid_world_m)))
+            rows.append(("centre", wording.place(last.centroid_world_m)))
             if len(item.sightings) > 1 and change.label is ChangeLabel.MOVED:
-                rows.append(("was at", _position(item.sightings[0].centroid_world_m)))
+                rows.append(("was at", wording.place(item.sightings[0].centroid_world_m)))
         if item.displacement_m is not None:
             rows.append(("displacement", wording.length(item.displacement_m)))
         if item.rotation_rad is not None and change.label is ChangeLabel.MOVED:
@@ -128,10 +128,6 @@ def unchanged(reviewed: ReviewedResult) -> str:
         f"<section><h2>{standalone('static')}Not changed</h2>"
         f'<p class="small">{count(len(same), "object")}: {ids}.</p></section>\n'
     )
-
-
-def _position(centroid_world_m: tuple[float, float, float]) -> str:
-    return "x {:.2f}, y {:.2f}, z {:.2f} m".format(*centroid_world_m)
 
 
 def _figure(change: Change, session: int, view: ObjectView | None) -> str:

@@ -66,7 +66,8 @@ def _title(item: MapObject, label: ChangeLabel, verdict: Verdict | None) -> str:
     return (
         f'<h3 class="oa-title">{chip(label)}'
         f'<span>Object <span class="oa-muted">#{item.object_id}</span></span>'
-        f'<small data-role="label">{escape(state)}</small></h3>'
+        f'<small data-role="label">{escape(state)}</small>'
+        '<button data-copy-link class="oa-copy" title="Copy a link to this finding (L)">Link</button></h3>'
     )
 
 
@@ -133,6 +134,8 @@ def _facts(item: MapObject) -> str:
         f"<tr><td>{wording.visit_word(sighting.session)}</td><td>{wording.size(sighting.extent_m)}</td>"
         f"<td>{_count(len(sighting.keyframes), 'keyframe')}</td>"
         f"<td>{_count(sighting.point_count, 'point')}</td></tr>"
+        '<tr><td></td><td colspan="3" class="oa-muted">centre '
+        f"{wording.place(sighting.centroid_world_m)}</td></tr>"
         for sighting in item.sightings
     )
     settled = (

@@ -43,7 +43,7 @@ LAYER_WORDS: Mapping[str, str] = {
 assert set(LAYER_WORDS) == {field.name for field in fields(Layers)}
 
 
-def hud_html(mode: str, colours: str, layers: Layers, *, dark: bool) -> str:
+def hud_html(mode: str, colours: str, layers: Layers, *, dark: bool, measuring: bool = False) -> str:
     """Switches at the top left of the map."""
     visits = "".join(
         f'<button aria-pressed="{str(mode == m).lower()}" {sends("mode", m)} '
@@ -67,6 +67,8 @@ def hud_html(mode: str, colours: str, layers: Layers, *, dark: bool) -> str:
         f'<button {sends("belief")} title="Look back at what was believed during the later visit">'
         "Over time</button>"
         f'<button {sends("overview")} title="See the whole site (H)">Overview</button>'
+        f'<button {sends("measure")} aria-pressed="{str(measuring).lower()}" '
+        'title="Measure a distance (T)">Measure</button>'
         '<details><summary title="What the map shows and how it is coloured">Layers</summary>'
         f'<div class="oa-popup"><b>Colour of objects</b>{paints}<b>Show</b>{switches}</div></details>'
         f'<button {sends("theme", not dark)} title="{theme}" aria-label="{theme}">{sign}</button>'

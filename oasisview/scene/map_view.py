@@ -16,9 +16,11 @@ from oasisview.catalogue import Catalogue
 from oasisview.panels.hud import Layers
 from oasisview.scene import outlines
 from oasisview.scene.cameras import draw_cameras
-from oasisview.scene.map_points import GROUND_RGB, MapPoints, Rgb, muted, object_colours
+from oasisview.scene.cut import CutBox
+from oasisview.scene.map_points import GROUND_RGB, MapPoints, Rgb, VisitPoints, muted, object_colours
 from oasisview.scene.marks import Marks
 from oasisview.scene.picking import pick_object
+from oasisview.scene.tape import point_on_ray
 from pipeline.result import ChangeLabel
 
 PAST_LABELS = (ChangeLabel.DISAPPEARED, ChangeLabel.MOVED)
@@ -52,6 +54,8 @@ class MapView:
         self._scene = client.scene
         self._catalogue = catalogue
         self._points = points
+        self._box: CutBox | None = None
+        self._visits = points.visits  # what of it is drawn: all, or what a cut leaves
         self._decided: VisitLabels = (label_of, label_of)
         self._labels: VisitLabels = self._decided
         self._label_rgb = label_rgb
@@ -68,10 +72,8 @@ class MapView:
         self._scene.set_up_direction(tuple(self._points.up_world))
         self._scene.add_frame("/map", show_axes=False, position=self._points.origin)
         self._ground()
-        for visit, points in enumerate(self._points.visits):
-            self._cloud(f"{visit}/background", points.background, points.background_rgb)
-            self._cloud(f"{visit}/ceiling", points.ceiling, points.ceiling_rgb)
-            self._cloud(f"{visit}/objects", points.objects, self._object_colours(visit))
+        for visit in range(len(self._visits)):
+            self._add_clouds(visit)
             self._add_picks(visit)
             draw_cameras(self._scene, self._catalogue.session(visit), visit, self._points, self._on_keyframe)
         self._add_gone()
@@ -95,7 +97,7 @@ class MapView:
     def set_colours(self, colours: str) -> None:
         """Colour objects by label, by identity or as recorded."""
         self._colours = colours
-        for visit, points in enumerate(self._points.visits):
+        for visit, points in enumerate(self._visits):
             for part, true in (("background", points.background_rgb), ("ceiling", points.ceiling_rgb)):
                 cloud = self._clouds.get(f"{visit}/{part}")
                 if cloud is not None:
@@ -122,6 +124,7 @@ class MapView:
     def follow(self, points: MapPoints) -> None:
         """The map as corrected: points that belong to other objects, and new labels."""
         self._points = points
+        self._visits = self._cut_visits()
         self.recolour()
 
     def recolour(self) -> None:
@@ -135,12 +138,46 @@ class MapView:
             self._draw_marks()
             self._apply_visibility()
 
+    def set_cut(self, box: CutBox | None) -> None:
+        """Draw only what lies in a box; None = everything."""
+        self._box = box
+        self._visits = self._cut_visits()
+        with self._client.atomic():
+            self.marks.outline_cut(box)
+            for visit in range(len(self._visits)):
+                self._add_clouds(visit)
+            self._add_gone()
+            self._draw_marks()
+            self._apply_visibility()
+
     # Clicks
+
+    def point_under(
+        self, origin: NDArray[np.floating], direction: NDArray[np.floating]
+    ) -> NDArray[np.float64] | None:
+        """The drawn point (3,) under a click, world; runs over all points, so off the loop."""
+        drawn = []
+        for visit, points in enumerate(self._visits):
+            if self._whole(visit):
+                drawn.append(points.objects)
+                if self._layers.background:
+                    drawn.append(points.background)
+                    drawn += [points.ceiling] if self._layers.ceiling else []
+            elif self._shows(visit):
+                drawn.append(points.objects[self._past(points.object_ids)])
+        local = np.asarray(origin, np.float64) - self._points.origin
+        points = np.concatenate(drawn) if drawn else np.zeros((0, 3), np.float32)
+        size = max(0.01, self._points.point_size_m)
+        for radius_m in (size, 2.5 * size, 6 * size):  # the wider ones for gaps between sparse points
+            found = point_on_ray(local, direction, points, radius_m)
+            if found is not None:
+                return np.asarray(found + self._points.origin)
+        return None
 
     def object_under(self, origin: NDArray[np.floating], direction: NDArray[np.floating]) -> int | None:
         """The object that a click along a ray (world) means; runs over all drawn points, so off the loop."""
         objects, ids, background = [], [], []
-        for visit, points in enumerate(self._points.visits):
+        for visit, points in enumerate(self._visits):
             if not self._shows(visit):
                 continue
             keep = slice(None) if self._whole(visit) else self._past(points.object_ids)
@@ -197,6 +234,10 @@ class MapView:
 
     # Nodes
 
+    def _cut_visits(self) -> tuple[VisitPoints, ...]:
+        visits, box = self._points.visits, self._box
+        return visits if box is None else tuple(box.cut(visit) for visit in visits)
+
     def _shown_label(self, object_id: int) -> ChangeLabel | None:
         """The label of an object as a whole, for what is drawn once for both visits."""
         item = self._catalogue.objects.get(object_id)
@@ -209,8 +250,16 @@ class MapView:
     def _ground(self) -> None:
         self._scene.set_background_image(np.full((2, 2, 3), GROUND_RGB[self._dark], np.uint8))
 
+    def _add_clouds(self, visit: int) -> None:
+        points = self._visits[visit]
+        self._cloud(f"{visit}/background", points.background, points.background_rgb)
+        self._cloud(f"{visit}/ceiling", points.ceiling, points.ceiling_rgb)
+        self._cloud(f"{visit}/objects", points.objects, self._object_colours(visit))
+
     def _cloud(self, name: str, points: NDArray[np.float32], true_rgb: NDArray[np.uint8]) -> None:
         if len(points) == 0:
+            self._remove(f"/map/{name}")
+            self._clouds.pop(name, None)
             return
         colours = true_rgb if name.endswith("objects") else self._ground_colours(true_rgb)
         self._clouds[name] = self._scene.add_point_cloud(
@@ -227,7 +276,7 @@ class MapView:
         return true_rgb if self._colours == "true" else muted(true_rgb, dark=self._dark)
 
     def _object_colours(self, visit: int) -> NDArray[np.uint8]:
-        points = self._points.visits[visit]
+        points = self._visits[visit]
         return object_colours(
             points.objects_rgb,
             points.object_ids,
@@ -239,7 +288,7 @@ class MapView:
 
     def _add_gone(self) -> None:
         """What Both adds to the later map: the earlier visit's points of what is gone or moved."""
-        points = self._points.visits[0]
+        points = self._visits[0]
         keep = self._past(points.object_ids)
         self._remove("/map/0/gone")
         self._clouds.pop("0/gone", None)

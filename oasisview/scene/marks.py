@@ -15,6 +15,7 @@ from oasisview.catalogue import Catalogue
 from oasisview.panels.hud import Layers
 from oasisview.panels.markup import GLYPHS
 from oasisview.scene import outlines
+from oasisview.scene.cut import CutBox
 from oasisview.scene.map_points import REPLACED_RGB, MapPoints, Rgb
 from oasisview.scene.names import readable
 from oasisview.wording import LABEL_NAMES
@@ -50,6 +51,7 @@ class Marks:
         self._drawing = threading.RLock()
         self._keyframe_centre: NDArray[np.float64] | None = None
         self._selected: int | None = None
+        self._cut: CutBox | None = None  # objects outside it get neither box nor name
 
     def draw(self, mode: str, layers: Layers, *, dark: bool) -> None:
         """Boxes and names anew, after labels, the visit shown or the theme changed."""
@@ -72,6 +74,15 @@ class Marks:
                 self._mark(item)
         self._arrange()
 
+    def outline_cut(self, box: CutBox | None) -> None:
+        """Show what the map is cut to."""
+        self._cut = box
+        self._remove("/map/cut")
+        if box is not None:
+            edges = outlines.dashed(outlines.edges_of(box.corners_world() - self._points.origin), 0.15)
+            grey = (167, 175, 188) if self._dark else (82, 90, 103)
+            self._scene.add_line_segments("/map/cut", edges, grey, thickness=1.5, thickness_units="screen")
+
     def show_keyframe(self, session: int, keyframe: int) -> None:
         """Mark the camera of the keyframe in the band."""
         record = self._catalogue.session(session).keyframes[keyframe]
@@ -93,6 +104,8 @@ class Marks:
             label = self._label_of(item.object_id)
             sighting = self._shown_sighting(item)
             if label in (None, ChangeLabel.STATIC) or sighting is None:
+                continue
+            if self._cut is not None and not self._cut.holds(np.array([sighting.centroid_world_m])).all():
                 continue
             edges = self._box(sighting)
             if sighting.session == 0 and self._mode == "both":

@@ -28,6 +28,11 @@ def box_segments(
     return box_corners(low, high)[_BOX_EDGES]
 
 
+def edges_of(corners: NDArray[np.floating]) -> NDArray[np.float32]:
+    """The (12, 2, 3) edges of a box given by its (8, 3) corners, in the order of :func:`box_corners`."""
+    return np.asarray(corners, np.float32)[_BOX_EDGES]
+
+
 def dashed(segments: NDArray[np.floating], dash_m: float) -> NDArray[np.float32]:
     """Cut (S, 2, 3) segments into dashes of ``dash_m`` with gaps of the same length."""
     pieces = []
