@@ -166,10 +166,10 @@ class MapView:
             elif self._shows(visit):
                 drawn.append(points.objects[self._past(points.object_ids)])
         local = np.asarray(origin, np.float64) - self._points.origin
-        points = np.concatenate(drawn) if drawn else np.zeros((0, 3), np.float32)
+        cloud = np.concatenate(drawn) if drawn else np.zeros((0, 3), np.float32)
         size = max(0.01, self._points.point_size_m)
         for radius_m in (size, 2.5 * size, 6 * size):  # the wider ones for gaps between sparse points
-            found = point_on_ray(local, direction, points, radius_m)
+            found = point_on_ray(local, direction, cloud, radius_m)
             if found is not None:
                 return np.asarray(found + self._points.origin)
         return None
