@@ -50,7 +50,10 @@
   const find = () => {
     const tabs = [...document.querySelectorAll("[role=tab]")];
     const queue = tabs.find((tab) => tab.textContent.trim() === "Queue");
-    if (queue && queue.getAttribute("aria-selected") !== "true") queue.click();
+    if (queue && queue.getAttribute("aria-selected") !== "true") {
+      // Viser's tabs listen to the keyboard and to drags, not to clicks.
+      queue.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
+    }
     finding = "";
     let tries = 0;
     const focus = () => {
@@ -58,7 +61,7 @@
       if ((!field || !field.offsetParent) && ++tries < 60) { requestAnimationFrame(focus); return; }
       const early = finding;
       finding = null;
-      if (!field) return;
+      if (!field || !field.offsetParent) return;
       field.focus();
       field.select();
       if (!early) return;
@@ -95,6 +98,13 @@
     else return;
     event.preventDefault();
   }, true);
+  // What was clicked with the pointer lets go of the focus, so that Enter accepts and does not click it again.
+  document.addEventListener("click", (event) => {
+    const clicked = event.target instanceof Element && event.target.closest(".oa [data-send], .oa [data-object]");
+    if (event.detail > 0 && clicked && !oasis.isField(clicked) && clicked.contains(document.activeElement)) {
+      document.activeElement.blur();
+    }
+  });
   // A menu closes once something was chosen in it, or something else is clicked.
   document.addEventListener("click", (event) => {
     document.querySelectorAll("details.oa-correct[open]").forEach((menu) => {
