@@ -7,11 +7,12 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from oasisview import wording
+from oasisview.correction_words import event_words
 from oasisview.export.exporter import ReviewedResult
 from oasisview.export.report_words import count, moment
-from oasisview.review import Event, Kind
+from oasisview.review import Event
 from oasisview.shell import escape
-from oasisview.wording import LABEL_NAMES, Limits
+from oasisview.wording import Limits
 from pipeline.settings import Settings
 
 
@@ -19,7 +20,7 @@ def decisions(reviewed: ReviewedResult) -> str:
     """The journal, oldest first: nothing that anybody did is left out."""
     if not reviewed.events:
         return "<section><h2>Decisions</h2><p>Nobody has decided anything yet.</p></section>\n"
-    rows = "".join(_decision(event) for event in reviewed.events)
+    rows = "".join(_decision(event, reviewed) for event in reviewed.events)
     head = "".join(f"<th>{name}</th>" for name in ("when", "who", "object", "what", "why"))
     return (
         '<section><h2>Decisions</h2><p class="small">The whole journal, oldest first; what was taken back is '
@@ -28,21 +29,9 @@ def decisions(reviewed: ReviewedResult) -> str:
     )
 
 
-def _decision(event: Event) -> str:
-    new, old = LABEL_NAMES[event.new_label], LABEL_NAMES[event.old_label]
-    what = {
-        Kind.ACCEPT: f"confirmed as {new}",
-        Kind.LABEL: f"{old} \u2192 {new}",
-        Kind.NOTE: "note",
-        Kind.UNDO: f"taken back; {new} again",
-        Kind.REDO: f"restored; {new} again",
-        Kind.MERGE: f"merged with others, now {new}",
-        Kind.SAME: f"the same as another, now {new}",
-        Kind.SPLIT: f"not one object, now {new}",
-        Kind.DROP: "not an object",
-        Kind.KEEP: "an object after all",
-        Kind.RESTORE: "an earlier state restored",
-    }[event.kind]
+def _decision(event: Event, reviewed: ReviewedResult) -> str:
+    target = reviewed.events[event.target_id - 1] if event.target_id else None
+    what = event_words(event, reviewed.corrected.machine, target)
     number = f"#{event.object_id}" if event.object_id else "all"
     cells = (moment(event.at), event.who, number, what, event.why)
     return f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>\n"
