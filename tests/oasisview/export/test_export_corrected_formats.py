@@ -42,4 +42,4 @@ def test_every_format_knows_the_same_objects(corrected_path: Path, tmp_path: Pat
     assert "object #8<" not in report and "object #12<" not in report
     assert "replaces no." not in report  # 7 took nobody's place any more
     assert "are the same object: static" in report
-    assert "<td>not an object</td>" in report
+    assert "<td>not an object: #12</td>" in report
