@@ -60,6 +60,7 @@ class TapeActions:
             on = not self._page.choices.measuring
             self._page.choices.measuring = on
             self._first = None
+            self._view.set_clickable(not on)
             if on:
                 self._scene.on_click()(self._clicked)
             else:

@@ -10,6 +10,9 @@
       if (!["object", "keyframe", "map"].includes(name)) url.searchParams.delete(name);
     }
     url.hash = "";
+    // The finding whose evidence is read: the address may still be on its way there.
+    const shown = document.querySelector("[data-evidence]");
+    if (shown) url.searchParams.set("object", shown.getAttribute("data-evidence"));
     return url.href;
   };
   // Browsers give the clipboard to secure pages only: neither plain HTTP on a network, nor some frames.

@@ -54,6 +54,7 @@ class MapView:
         self._scene = client.scene
         self._catalogue = catalogue
         self._points = points
+        self._clickable = True
         self._box: CutBox | None = None
         self._visits = points.visits  # what of it is drawn: all, or what a cut leaves
         self._decided: VisitLabels = (label_of, label_of)
@@ -137,6 +138,11 @@ class MapView:
             self._add_gone()
             self._draw_marks()
             self._apply_visibility()
+
+    def set_clickable(self, on: bool) -> None:
+        """Whether objects answer to clicks, and are outlined under the pointer."""
+        self._clickable = on
+        self._apply_visibility()
 
     def set_cut(self, box: CutBox | None) -> None:
         """Draw only what lies in a box; None = everything."""
@@ -328,7 +334,7 @@ class MapView:
                 if cloud is not None and cloud.visible != on:
                     cloud.visible = on
             if visit in self._picks:
-                self._picks[visit].visible = self._shows(visit)
+                self._picks[visit].visible = self._clickable and self._shows(visit)
             for kind, on in (("keyframes", self._layers.keyframes), ("path", self._layers.path)):
                 for suffix in ("", "_pick"):
                     handle = self._scene.get_handle_by_name(f"/map/{kind}{suffix}/{visit}")

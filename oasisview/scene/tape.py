@@ -95,7 +95,7 @@ class TapeMarks:
     def __init__(self, scene: viser.SceneApi, origin: NDArray[np.floating], point_size_m: float) -> None:
         self._scene = scene
         self._origin = np.asarray(origin, np.float64)
-        self._end_size = float(np.clip(2.5 * point_size_m, 0.02, 0.3))
+        self._end_size = float(np.clip(1.3 * point_size_m, 0.015, 0.2))
 
     def draw(self, measurements: list[Measurement], first: Point | None, *, dark: bool) -> None:
         """Everything anew; ``first`` is a point that has no second one yet."""
