@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from oasisview import heatmap_colours
 from oasisview.assets import Asset, AssetTable
+from oasisview.crops import PixelBox
 from oasisview.matrix_window import display_order
 from oasisview.object_views import BeforeAfter, ObjectView, ObjectViews
 from oasisview.priority import priority
@@ -138,6 +139,10 @@ class Catalogue:
         return self._register(
             f"image/{session}/{keyframe}.jpg", lambda: Asset("image/jpeg", path.read_bytes())
         )
+
+    def same_viewpoint_url(self, session: int, keyframe: int, box: PixelBox | None = None) -> str:
+        """The other visit as this keyframe's camera would have seen it; empty if nothing sees this view."""
+        return self._views.same_viewpoint_url(session, keyframe, box)
 
     def heatmap_url(self, kind: str, session: int, keyframe: int, *, dark: bool) -> str:
         """The coloured heatmap of a keyframe; kind is ``semantic`` or ``geometric``."""

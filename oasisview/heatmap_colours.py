@@ -112,6 +112,11 @@ def _interpolated(array: NDArray[np.floating], height: int, width: int) -> NDArr
     return rows[:, left] * (1 - across) + rows[:, right] * across
 
 
+def hatched(image: NDArray[np.uint8], unseen: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """An (H, W, 3) picture with what is unknown (H, W) hatched as in the heatmaps."""
+    return _hatch(image, unseen, dark=True)
+
+
 def _hatch(image: NDArray[np.uint8], unseen: NDArray[np.bool_], *, dark: bool) -> NDArray[np.uint8]:
     rows, columns = np.indices(unseen.shape)
     stripe = ((rows + columns) // 5) % 2 == 0

@@ -314,6 +314,7 @@ class Inspector:
         with self._lock:
             self.choices.swipe = not self.choices.swipe
             self._page.show_evidence()
+            self._show_band()
 
     def _show_band(self, *, whole: bool = False) -> None:
         self._page.show_band(whole=whole)

@@ -13,9 +13,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from oasisview import crops
+from oasisview import crops, heatmap_colours
 from oasisview.assets import Asset
 from oasisview.crops import LinkLine, PixelBox
+from oasisview.same_viewpoint import SameViewpoint
 from pipeline.result import MapObject, Result, SessionResult, Sighting
 
 _CROP_WIDTH_PX = 400
@@ -80,6 +81,7 @@ class ObjectViews:
         self._register = register
         self._crop_quality = crop_quality
         self.best = lru_cache(maxsize=1024)(self._best)
+        self._same = lru_cache(maxsize=8)(SameViewpoint(result).picture)
         self.before_after = lru_cache(maxsize=256)(self._before_after)
 
     def _session(self, index: int) -> SessionResult:
@@ -155,6 +157,38 @@ class ObjectViews:
             bounds.height / box.height * 100,
         )
         return ObjectView(session, keyframe, box, self._crop_url(session, keyframe, box), "", place)
+
+    def same_viewpoint_url(self, session: int, keyframe: int, box: PixelBox | None = None) -> str:
+        """The other visit from a keyframe's camera, whole or a crop; empty if nothing sees this view."""
+        if not self._session(session).keyframes[keyframe].covisible:
+            return ""
+        if box is None:
+            return self._register(
+                f"same/{session}/{keyframe}.jpg", lambda: self._same_viewpoint(session, keyframe, None)
+            )
+        left, top, width, height = (int(v) for v in (box.left, box.top, box.width, box.height))
+        return self._register(
+            f"same/{session}/{keyframe}/{left}-{top}-{width}-{height}.jpg",
+            lambda: self._same_viewpoint(session, keyframe, (left, top, width, height)),
+        )
+
+    def _same_viewpoint(
+        self, session: int, keyframe: int, box: tuple[int, int, int, int] | None
+    ) -> Asset | None:
+        found = self._same(session, keyframe)
+        if found is None:
+            return None
+        image, known = found
+        if box is not None:
+            left, top, width, height = box
+            rows, columns = slice(top, top + height), slice(left, left + width)
+            image, known = image[rows, columns], known[rows, columns]
+            size = (_CROP_WIDTH_PX, round(_CROP_WIDTH_PX / crops.CROP_ASPECT))
+            image = cv2.resize(image, size, interpolation=cv2.INTER_CUBIC)
+            known = cv2.resize(known.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+        picture = heatmap_colours.hatched(image, ~known)
+        encoded, data = cv2.imencode(".jpg", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
+        return Asset("image/jpeg", data.tobytes()) if encoded else None
 
     def _crop_url(self, session: int, keyframe: int, box: PixelBox) -> str:
         left, top, width, height = (int(v) for v in (box.left, box.top, box.width, box.height))

@@ -199,6 +199,7 @@ class Page:
             dark=choices.dark,
             pick=choices.patch,
             with_links=choices.links,
+            swipe=choices.swipe,
         )
         if whole:
             self._shell.set_html("band", content)

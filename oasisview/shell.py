@@ -59,7 +59,7 @@ SHELL_KEYS = (
     ("Ctrl+K", "find a command by its name"),
 )
 # Run in this order after shell.js; each extends window.oasis.
-SCRIPTS = ("dialogs.js", "grid.js", "links.js", "review.js", "sharing.js")
+SCRIPTS = ("dialogs.js", "grid.js", "links.js", "review.js", "sharing.js", "swipe.js")
 # What a shell key sends, as commands of viser for pages that cannot be extended.
 FALLBACK_COMMANDS = {"swipe": ("Swipe before / after", "X"), "overview": ("See the whole site", "H")}
 

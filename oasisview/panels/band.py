@@ -10,6 +10,7 @@ from scipy import ndimage
 from oasisview import crops, wording
 from oasisview.catalogue import Catalogue
 from oasisview.heatmap_colours import CIVIDIS, GEOMETRIC_RANGE_M, geometric_anchors, gradient_css
+from oasisview.panels.before_after import swipe_html
 from oasisview.panels.markup import empty, key, sends
 from oasisview.panels.patch_overlay import PatchOverlay, patch_overlay
 from oasisview.patch_links import PatchPick
@@ -31,10 +32,12 @@ def band_html(
     dark: bool,
     pick: PatchPick | None = None,
     with_links: bool = False,
+    swipe: bool = False,
 ) -> str:
     """The band for a keyframe of a visit; what changes while scrubbing carries ``data-part``.
 
-    ``pick`` is a patch whose match is shown; ``with_links`` shows the matches of the selected object.
+    ``pick`` is a patch whose match is shown; ``with_links`` shows the matches of the selected object;
+    ``swipe`` lays the other visit over the keyframe, from its own viewpoint.
     """
     visit = catalogue.session(session)
     if not visit.keyframes:
@@ -48,7 +51,10 @@ def band_html(
         shown = (keyframe, pair.other_keyframe) if session == 0 else (pair.other_keyframe, keyframe)
         overlay = patch_overlay(catalogue, shown, pick, selected if with_links else None)
     note = f"kf {keyframe + 1}"
-    pictures = [_image(catalogue, "this", this_word, note, session, keyframe, selected, label_of, overlay)]
+    same = catalogue.same_viewpoint_url(session, keyframe) if swipe else ""
+    pictures = [
+        _image(catalogue, "this", this_word, note, session, keyframe, selected, label_of, overlay, same)
+    ]
     if pair is None:
         nothing = f'<div class="oa-pic">{empty(wording.NO_SHARED_VIEW)}</div>'
         titles = {"other": other_word, "semantic": "Looks different", "geometric": "Shape different"}
@@ -65,13 +71,20 @@ def band_html(
     title = f"frame {record.frame_index} of the recording, submap {record.submap + 1}"
     return (
         f'<div class="oa-band" data-session="{session}" data-keyframe="{keyframe}">'
-        f"{_scrubber(catalogue, session, keyframe, selected, title, with_links=with_links)}"
+        f"{_scrubber(catalogue, session, keyframe, selected, title, with_links=with_links, swipe=swipe)}"
         f'<div class="oa-pictures">{"".join(pictures)}</div></div>'
     )
 
 
 def _scrubber(
-    catalogue: Catalogue, session: int, keyframe: int, selected: int | None, title: str, *, with_links: bool
+    catalogue: Catalogue,
+    session: int,
+    keyframe: int,
+    selected: int | None,
+    title: str,
+    *,
+    with_links: bool,
+    swipe: bool,
 ) -> str:
     count = len(catalogue.session(session).keyframes)
     switch = "".join(
@@ -92,7 +105,10 @@ def _scrubber(
         f'<input type="range" min="0" max="{max(count - 1, 0)}" value="{keyframe}" data-part="slider" '
         'data-send="scrub" aria-label="Keyframe"></span>'
         f"{_step(1, 'Next keyframe', 'N', NEXT_SIGN)}"
-        f'<span data-part="step" class="oa-steps"><button {sends("links")} '
+        f'<span data-part="step" class="oa-steps"><button {sends("swipe")} '
+        f'aria-pressed="{str(swipe).lower()}" title="One visit over the other, from one viewpoint (X)">'
+        "swipe</button>"
+        f"<button {sends('links')} "
         f'aria-pressed="{str(with_links).lower()}" title="Draw where the selected object\'s patches match">'
         f'links</button><button {sends("best_view")} title="{best_tip}" '
         f"{'' if selected is not None else 'disabled'}>best view</button>"
@@ -132,10 +148,15 @@ def _image(
     selected: int | None,
     label_of: LabelOf,
     overlay: PatchOverlay | None,
+    same_viewpoint: str = "",
 ) -> str:
     url = catalogue.image_url(session, keyframe)
+    pictures = f'<img src="{escape(url)}" alt="{escape(title)}, {escape(note)}" draggable="false">'
+    if same_viewpoint:
+        before, after = (url, same_viewpoint) if session == 0 else (same_viewpoint, url)
+        pictures = swipe_html(before, after, note)
     body = _clickable(
-        f'<img src="{escape(url)}" alt="{escape(title)}, {escape(note)}" draggable="false">'
+        pictures
         + _overlay(catalogue, session, keyframe, selected, label_of)
         + (overlay.marks(session) if overlay is not None else ""),
         session,

@@ -22,19 +22,49 @@ def before_after_html(catalogue: Catalogue, item: MapObject, *, swipe: bool) -> 
         f'<button {sends("swipe")} aria-pressed="{str(swipe).lower()}" title="One over the other">'
         f"swipe {key('X')}</button></div>"
     )
-    if swipe and views.before is not None and views.after is not None:
-        return head + _swipe(views.before, views.after)
+    if swipe:
+        swiped = _registered(catalogue, item, views)
+        if swiped:
+            return head + swiped
     figures = _figure(item, 0, views.before) + _figure(item, 1, views.after)
     return head + f'<div class="oa-crops">{figures}{_lines(views)}</div>{_note(views)}'
 
 
-def _swipe(before: ObjectView, after: ObjectView) -> str:
+def _registered(catalogue: Catalogue, item: MapObject, views: BeforeAfter) -> str:
+    """One picture over the other from one viewpoint: that of the crop that shows the object itself."""
+    shown = [view for view in (views.after, views.before) if view is not None]
+    shown.sort(key=lambda view: view.place is not None)
+    for view in shown:
+        other = catalogue.same_viewpoint_url(view.session, view.keyframe, view.box)
+        if other:
+            before, after = (view.url, other) if view.session == 0 else (other, view.url)
+            visit = wording.visit_word(view.session).lower()
+            seen = f"seen from kf {view.keyframe + 1} of {visit}"
+            line = f"oa-line oa-{LABEL_NAMES[item.label]}"
+            outline = (
+                '<svg viewBox="0 0 100 100" preserveAspectRatio="none">'
+                f'<path d="{view.outline}" class="oa-halo"/><path d="{view.outline}" class="{line}"/></svg>'
+            )
+            pictures = swipe_html(before, after, seen)
+            return f'<div class="oa-swipe">{pictures}{outline}</div>{_swipe_note(visit)}'
+    return ""
+
+
+def _swipe_note(visit: str) -> str:
+    other = "before" if visit == "after" else "after"
     return (
-        f'<div class="oa-swipe"><img src="{escape(after.url)}" alt="After">'
-        f'<img class="oa-over" src="{escape(before.url)}" alt="Before">'
-        '<span class="oa-caption">Before \u25c2 \u25b8 After</span>'
-        '<input type="range" min="0" max="100" value="50" aria-label="Before or after" '
-        "oninput=\"this.parentNode.style.setProperty('--x',this.value+'%')\"></div>"
+        f'<div class="oa-note">The picture of {other} is drawn from the camera of {visit}, by depth and '
+        "poses; hatched: no picture shows it.</div>"
+    )
+
+
+def swipe_html(before_url: str, after_url: str, seen: str) -> str:
+    """Two pictures of one viewpoint with a slider between them; all sliders of a page move together."""
+    return (
+        f'<img class="oa-under" src="{escape(after_url)}" alt="After, {escape(seen)}" draggable="false">'
+        f'<img class="oa-over" src="{escape(before_url)}" alt="Before, {escape(seen)}" draggable="false">'
+        f'<span class="oa-caption">Before \u25c2 \u25b8 After \u00b7 {escape(seen)}</span>'
+        '<input type="range" min="0" max="100" value="50" data-swipe aria-label="Before or after">'
     )
 
 

@@ -284,3 +284,33 @@ def test_a_clicked_patch_shows_its_match_in_the_other_picture(app, view) -> None
     page.locator('#oa-band [data-send="links"]').click()
     expect(page.locator(".oa-lines")).to_have_count(0, timeout=PATIENCE_MS)
     assert not page.problems
+
+
+def test_swipes_of_one_viewpoint_move_together_and_let_clicks_through(app, view) -> None:
+    page = view.page
+    page.evaluate("() => { O('select', 6); O('keyframe', {session: 1, keyframe: 2}); }")
+    page.wait_for_selector('[data-evidence="6"]')
+    page.locator('#oa-band [data-send="swipe"]').click()
+    band, crop = page.locator("#oa-band [data-swipe]"), page.locator(".oa-swipe [data-swipe]")
+    expect(band).to_have_count(1, timeout=PATIENCE_MS)
+    expect(crop).to_have_count(1, timeout=PATIENCE_MS)
+    sizes = "() => [...document.querySelectorAll('img.oa-under, img.oa-over')].map(i => i.naturalWidth)"
+    view.wait_for(lambda: len(page.evaluate(sizes)) == 4 and min(page.evaluate(sizes)) > 0, "four pictures")
+    addresses = page.eval_on_selector_all("#oa-band .oa-frame img", "images => images.map(i => i.src)")
+    assert "/same/1/2.jpg" in addresses[1] and "/image/1/2.jpg" in addresses[0]  # before over after
+
+    band.fill("30")
+    expect(crop).to_have_value("30")
+    over = page.locator("#oa-band .oa-over")
+    assert "70%" in over.evaluate("node => getComputedStyle(node).clipPath")
+    page.evaluate("() => O('step_keyframe', 1)")
+    view.wait_js("() => document.querySelector('[data-part=this] figcaption').innerText.includes('kf 4')")
+    expect(page.locator("#oa-band [data-swipe]")).to_have_value("30", timeout=PATIENCE_MS)
+
+    frame = page.locator('[data-part="this"] .oa-frame').bounding_box()
+    page.mouse.click(frame["x"] + 0.8 * frame["width"], frame["y"] + 0.55 * frame["height"])
+    expect(page.locator('[data-part="other"] .oa-patch-words')).to_be_visible(timeout=PATIENCE_MS)
+    page.locator('[data-send="patch_clear"]').click()
+    page.keyboard.press("x")
+    expect(page.locator("[data-swipe]")).to_have_count(0, timeout=PATIENCE_MS)
+    assert not page.problems
