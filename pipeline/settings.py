@@ -249,7 +249,6 @@ class PatternSettings:
     search_radius_pixels: int = setting(
         2, "a pattern is looked for this far from where the poses put it", unit="strided pixels"
     )
-    same_correlation: float = setting(0.6, "a pattern that correlates less is another one")
 
 
 @dataclass(frozen=True)
@@ -269,6 +268,9 @@ class MoveSettings:
     size_ratio: float = setting(3.0, "objects whose sizes differ by more are not one")
     partners_per_object: int = setting(6, "likest candidates that an object is laid over", least=1)
     max_registrations: int = setting(250, "most pairs of objects that are laid over each other", least=1)
+    least_print_support: float = setting(
+        1.5, "two objects whose prints agree in so many places are laid over each other by them", unit="places"
+    )
     min_rotation_deg: float = setting(
         10.0, "an object turned on the spot by more than this moved", unit="deg"
     )
@@ -290,6 +292,7 @@ class MoveSettings:
     vacated_weight: float = setting(2.12, "log odds for the share of both places seen to be empty")
     voxels_weight: float = setting(-0.24, "log odds per log voxel of the smaller object")
     chroma_rank_weight: float = setting(-0.55, "log odds per log share of pairs of colours as like")
+    print_weight: float = setting(1.5, "log odds per log number of places of a print that both show")
     agreement_rank_weight: float = setting(0.11, "log odds per log share of pairs that agree as well")
 
 
@@ -309,6 +312,8 @@ class ChangeSettings:
     texture_weight: float = setting(1.99, "log odds per spread of lost texture correlation")
     tail_weight: float = setting(1.01, "log odds per spread of the share of unexplained colours")
     pattern_weight: float = setting(1.73, "log odds per spread of lost fine pattern")
+    print_here_weight: float = setting(-1.5, "log odds per log number of places whose print stayed here")
+    print_elsewhere_weight: float = setting(1.5, "log odds per log number of places whose print is elsewhere")
     full_appearance_scale: float = setting(
         0.2, "colour spread between the visits up to which appearance counts fully", unit="log units"
     )

@@ -267,7 +267,9 @@ class _Run:
         objects: tuple[SessionObjects, SessionObjects],
     ) -> tuple[VisitImages, VisitImages]:
         visits = [
-            VisitImages(geometry, objects[visit], self._features(visit, geometry))
+            VisitImages(
+                geometry, objects[visit], self._features(visit, geometry), self._images(visit, geometry)
+            )
             for visit, geometry in enumerate(geometries)
         ]
         return visits[0], visits[1]

@@ -8,7 +8,7 @@ shape, pattern and colour, and by how often the colours of any two things of thi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
@@ -17,8 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from pipeline.association.cloud_agreement import ENOUGH_SHARED, ObjectCloud, ObjectRegistration
-from pipeline.association.object_registration import register_objects
+from pipeline.association.cloud_agreement import (
+    ENOUGH_SHARED,
+    ObjectCloud,
+    ObjectRegistration,
+)
+from pipeline.association.keypoint_registration import KeypointRegistration
+from pipeline.association.object_registration import agreement_of, register_objects
 from pipeline.settings import MoveSettings
 
 _THREADS = 2
@@ -43,6 +48,7 @@ FEATURES = (
     "voxels",
     "chroma_rank",
     "agreement_rank",
+    "print",
 )
 
 
@@ -113,6 +119,13 @@ class _Pair:
     current: Candidate
     chroma_distance: float
     log_ratios: NDArray[np.float64]
+    printed: KeypointRegistration | None
+
+    @property
+    def unlikeness(self) -> float:
+        """Orders pairs: those of one print first, then by colours and sizes."""
+        support = self.printed.support if self.printed is not None else 0.0
+        return self.chroma_distance + _SIZE_IN_RANKING * float(self.log_ratios.max()) - support
 
 
 def score_moves(
@@ -120,21 +133,26 @@ def score_moves(
     current: Sequence[Candidate],
     up_world: NDArray[np.floating],
     spacing_m: float,
+    prints: Mapping[tuple[int, int], KeypointRegistration],
     settings: MoveSettings,
 ) -> list[ScoredMove]:
-    """Score all pairs that are alike enough in colour and size to be worth a registration.
+    """Score all pairs that share a print, or are alike enough in colour and size to be laid over each other.
 
     Args:
         previous, current: objects that left, and that took, a place.
         up_world: (3,) against gravity.
         spacing_m: distance of neighbouring points of the clouds.
+        prints: by previous and current instance, what their keypoints agree on.
     """
-    pairs = _alike(previous, current, up_world, spacing_m, settings)
+    pairs = _promising(previous, current, up_world, spacing_m, prints, settings)
     if not pairs:
         return []
 
     def registered(pair: _Pair) -> ObjectRegistration:
-        return register_objects(pair.previous.cloud, pair.current.cloud, up_world, spacing_m)
+        clouds = pair.previous.cloud, pair.current.cloud
+        if pair.printed is not None and pair.printed.support >= settings.least_print_support:
+            return agreement_of(*clouds, pair.printed.T_world_motion, spacing_m)
+        return register_objects(*clouds, up_world, spacing_m)
 
     with ThreadPoolExecutor(_THREADS) as threads:
         registrations = list(threads.map(registered, pairs))
@@ -143,7 +161,8 @@ def score_moves(
     weights = np.array([getattr(settings, f"{name}_weight") for name in FEATURES])
     moves = []
     for pair, registration, *ranks in zip(pairs, registrations, chroma_rank, agreement_rank, strict=True):
-        features = np.array([*_features(pair, registration), *ranks])
+        support = pair.printed.support if pair.printed is not None else 0.0
+        features = np.array([*_features(pair, registration), *ranks, np.log1p(support)])
         log_odds = settings.bias + float(weights @ features)
         moves.append(
             ScoredMove(pair.previous.instance, pair.current.instance, registration, features, log_odds)
@@ -189,14 +208,15 @@ def moves_table(
     return rows
 
 
-def _alike(
+def _promising(
     previous: Sequence[Candidate],
     current: Sequence[Candidate],
     up_world: NDArray[np.floating],
     spacing_m: float,
+    prints: Mapping[tuple[int, int], KeypointRegistration],
     settings: MoveSettings,
 ) -> list[_Pair]:
-    """Pairs of like colours and sizes; of each object, the likest few."""
+    """Pairs of one print; and of like colours and sizes, of each object the likest few."""
     described = [
         [
             (_chroma_quantiles(c.cloud), np.log(size_m(c.cloud.points_world, up_world, spacing_m)))
@@ -209,9 +229,14 @@ def _alike(
         for candidate1, (chroma1, size1) in zip(current, described[1], strict=True):
             distance = float(np.abs(chroma0 - chroma1).mean())
             ratios = np.abs(size0 - size1)
-            if distance < settings.chroma_distance and ratios.max() < np.log(settings.size_ratio):
-                pairs.append(_Pair(candidate0, candidate1, distance, ratios))
-    pairs.sort(key=lambda pair: pair.chroma_distance + _SIZE_IN_RANKING * float(pair.log_ratios.max()))
+            printed = prints.get((candidate0.instance, candidate1.instance))
+            pair = _Pair(candidate0, candidate1, distance, ratios, printed)
+            is_printed = printed is not None and printed.support >= settings.least_print_support
+            if is_printed or (
+                distance < settings.chroma_distance and ratios.max() < np.log(settings.size_ratio)
+            ):
+                pairs.append(pair)
+    pairs.sort(key=lambda pair: pair.unlikeness)
     kept, of_previous, of_current = [], dict[int, int](), dict[int, int]()
     for pair in pairs:
         row, column = pair.previous.instance, pair.current.instance

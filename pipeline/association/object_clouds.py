@@ -22,6 +22,11 @@ CELL_PER_VOXEL = 0.4
 _KEYFRAMES_KEPT = 24
 
 
+def cell_m(geometry: SessionGeometry) -> float:
+    """Distance of neighbouring points of the fine clouds, metres."""
+    return CELL_PER_VOXEL * geometry.surface.voxel_size_m
+
+
 class ObjectClouds:
     """Gathers the clouds of objects of one visit; remembers what it gathered.
 
@@ -36,7 +41,7 @@ class ObjectClouds:
         self._geometry = geometry
         self._objects = objects
         self._log_gain = np.asarray(log_gain, np.float32)
-        self.cell_m = CELL_PER_VOXEL * geometry.surface.voxel_size_m
+        self.cell_m = cell_m(geometry)
         self._clouds: dict[int, ObjectCloud] = {}
         self._keyframe = lru_cache(_KEYFRAMES_KEPT)(self._read)
 

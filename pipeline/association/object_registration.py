@@ -64,6 +64,19 @@ def register_objects(
     return max(found, key=lambda registration: registration.agreement)
 
 
+def agreement_of(
+    previous: ObjectCloud,
+    current: ObjectCloud,
+    T_world_motion: NDArray[np.float64],
+    spacing_m: float,
+) -> ObjectRegistration:
+    """How well two clouds agree under a motion that is known; arguments as in ``register_objects``."""
+    previous, current = previous.sampled(_COMPARED_SAMPLE), current.sampled(_COMPARED_SAMPLE)
+    tree = cKDTree(current.points_world)
+    rotation, translation = T_world_motion[:3, :3], T_world_motion[:3, 3]
+    return agreement_under(previous, current, tree, rotation, translation, spacing_m)
+
+
 class _Target:
     """The cloud that others are laid over, as points of space and colour."""
 

@@ -51,7 +51,7 @@ def change_log_odds(
     Args:
         appearance_scale: spread of the colour residual between the visits, log units.
     """
-    seen_through, patches, residual, texture, tail, pattern = change_features(evidence).T
+    seen_through, patches, residual, texture, tail, pattern, here, elsewhere = change_features(evidence).T
     return (
         settings.bias
         + settings.seen_through_weight * seen_through
@@ -63,14 +63,17 @@ def change_log_odds(
             + settings.tail_weight * tail
         )
         + settings.pattern_weight * pattern
+        + settings.print_here_weight * here
+        + settings.print_elsewhere_weight * elsewhere
     )
 
 
 def change_features(evidence: ObjectEvidence) -> NDArray[np.float64]:
-    """(K + 1, 6) what the weights apply to.
+    """(K + 1, 8) what the weights apply to.
 
     Seen-through share, and in spreads from the unchanged objects: patch dissimilarity, colour residual, lost
-    texture correlation, share of unexplained colours, lost fine pattern.
+    texture correlation, share of unexplained colours, lost fine pattern. Then the logarithms of the places
+    of its print that were found again, here and elsewhere.
     """
     patches = _relative(
         evidence, np.nan_to_num(evidence.dissimilarity), _DISSIMILARITY, np.isfinite(evidence.dissimilarity)
@@ -88,7 +91,8 @@ def change_features(evidence: ObjectEvidence) -> NDArray[np.float64]:
     # An object of few compared voxels scatters: it counts less.
     weight = evidence.compared_count / (evidence.compared_count + _RELIABLE_VOXELS)
     appearance = np.concatenate([patches[:, None], colours], axis=1) * weight[:, None]
-    return np.concatenate([evidence.seen_through[:, None], appearance, pattern[:, None]], axis=1)
+    prints = np.log1p(np.stack([evidence.print_here, evidence.print_elsewhere], axis=1))
+    return np.concatenate([evidence.seen_through[:, None], appearance, pattern[:, None], prints], axis=1)
 
 
 def appearance_trust(appearance_scale: float, settings: ChangeSettings) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.association.accumulation import AccumulatedAssociation
 from pipeline.association.moves import Candidate, ScoredMove, score_moves
-from pipeline.association.object_clouds import ObjectClouds
+from pipeline.association.object_clouds import ObjectClouds, cell_m
 from pipeline.change.appearance import AppearanceResidual, appearance_residual
 from pipeline.change.change_score import change_log_odds
 from pipeline.change.colocation import nearest_instances, overlap_matrix
@@ -19,6 +19,7 @@ from pipeline.change.evidence import object_evidence
 from pipeline.change.move_choice import MoveChoice
 from pipeline.change.observation import Observation
 from pipeline.change.observe import MutualObservation
+from pipeline.change.prints import Prints, PrintSupport, find_prints
 from pipeline.correspondence.compare import Comparison, VisitImages
 from pipeline.correspondence.heatmaps import change_of_similarity
 from pipeline.correspondence.pattern import PatternAgreement
@@ -65,6 +66,7 @@ def decide(
     similarity = (PlaceSimilarity.empty(previous.objects.count), PlaceSimilarity.empty(current.objects.count))
     pattern = (PatternAgreement.empty(previous.objects.count), PatternAgreement.empty(current.objects.count))
     last_keyframe = _last_keyframes(current)
+    prints = find_prints(previous, current, cell_m(previous.geometry), settings)
     # The previous visit was seen as a whole before the current one began.
     compared1 = _compared(current, observation.of_current, settings)
     evidence: list[tuple[VisitEvidence, VisitEvidence]] = []
@@ -77,13 +79,15 @@ def decide(
         for so_far, added in zip(pattern, patterns, strict=True):
             so_far.add(added[submap])
         is_met = current.geometry.first_keyframe <= last_keyframe[submap]
+        is_met_object = np.bincount(current.objects.instance_of_voxel, is_met, current.objects.count + 1) > 0
+        printed = prints.support(is_met_object)
         dissimilarity = [change_of_similarity(s.mean, extractor.similarity) for s in similarity]
         compared0 = _compared(previous, seen_so_far, settings)
         evidence0 = _visit_evidence(
-            previous, compared0, ~observation.is_noise0, dissimilarity[0], pattern[0], settings
+            previous, compared0, ~observation.is_noise0, dissimilarity[0], pattern[0], printed[0], settings
         )
         evidence1 = _visit_evidence(
-            current, compared1, is_met & ~observation.is_noise1, dissimilarity[1], pattern[1], settings
+            current, compared1, is_met & ~observation.is_noise1, dissimilarity[1], pattern[1], printed[1], settings
         )
         evidence.append((evidence0, evidence1))
         if settings.change.rule == "paper":
@@ -95,7 +99,8 @@ def decide(
     moves: list[ScoredMove] = []
     overlap: NDArray[np.float64] | None = None
     if settings.change.rule == "evidence":
-        moves = _scored_moves((previous, current), evidence[-1], compared1.appearance.log_gain, settings)
+        log_gain = compared1.appearance.log_gain
+        moves = _scored_moves((previous, current), evidence[-1], prints, log_gain, settings)
         find_moves = MoveChoice(moves, evidence[-1], settings)
         nearest0, nearest1 = _nearest(previous, current), _nearest(current, previous)
         for submap, pair in enumerate(evidence):
@@ -155,6 +160,7 @@ def _visit_evidence(
     is_met: NDArray[np.bool_],
     dissimilarity: NDArray[np.float64],
     pattern: PatternAgreement,
+    prints: PrintSupport,
     settings: Settings,
 ) -> VisitEvidence:
     surface = visit.geometry.surface
@@ -170,6 +176,7 @@ def _visit_evidence(
         surface.points_world,
         dissimilarity,
         pattern,
+        prints,
     )
     log_odds = change_log_odds(evidence, compared.appearance.scale, settings.change)
     return VisitEvidence(evidence, log_odds, evidence.voxel_count > 0)
@@ -178,6 +185,7 @@ def _visit_evidence(
 def _scored_moves(
     visits: tuple[VisitImages, VisitImages],
     final: tuple[VisitEvidence, VisitEvidence],
+    prints: Prints,
     log_gain: NDArray[np.float64],
     settings: Settings,
 ) -> list[ScoredMove]:
@@ -203,4 +211,6 @@ def _scored_moves(
         for of_visit, evidence in zip(clouds, final, strict=True)
     ]
     up_world = visits[0].geometry.surface.up_world
-    return score_moves(candidates[0], candidates[1], up_world, clouds[0].cell_m, settings.moves)
+    return score_moves(
+        candidates[0], candidates[1], up_world, clouds[0].cell_m, prints.registrations, settings.moves
+    )

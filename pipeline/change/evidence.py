@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.change.appearance import MIN_COMPARED_VOXELS, AppearanceResidual
+from pipeline.change.prints import PrintSupport
 from pipeline.correspondence.pattern import PatternAgreement
 from pipeline.mapping.colours import within_faces
 
@@ -32,7 +33,8 @@ _TABLE = (
     "dissimilarity",
     "pattern_pixels",
     "pattern_correlation",
-    "pattern_lost",
+    "print_here",
+    "print_elsewhere",
 )
 
 
@@ -54,7 +56,8 @@ class ObjectEvidence:
             the scale of the semantic heatmap (log odds); NaN where no keyframe compared it.
         pattern_pixels: pixels of all compared keyframes that show a pattern on the object.
         pattern_correlation: mean local correlation of the pattern in the two visits; NaN without pixels.
-        pattern_lost: share of the pattern that the other visit does not show; NaN without pixels.
+        print_here: places of its print that the other visit shows where they were (``Prints``).
+        print_elsewhere: places of its print that the other visit shows somewhere else.
     """
 
     voxel_count: NDArray[np.int64]
@@ -69,7 +72,8 @@ class ObjectEvidence:
     dissimilarity: NDArray[np.float64]
     pattern_pixels: NDArray[np.float64]
     pattern_correlation: NDArray[np.float64]
-    pattern_lost: NDArray[np.float64]
+    print_here: NDArray[np.float64]
+    print_elsewhere: NDArray[np.float64]
 
     @classmethod
     def from_table(cls, rows: NDArray[np.void]) -> ObjectEvidence:
@@ -106,6 +110,7 @@ def object_evidence(
     points_world: NDArray[np.float32],
     dissimilarity: NDArray[np.float64],
     pattern: PatternAgreement,
+    prints: PrintSupport,
 ) -> ObjectEvidence:
     """Gather the evidence of all instances.
 
@@ -118,6 +123,7 @@ def object_evidence(
         own_log_colours, normals_world, points_world: (M, 3) of the surface.
         dissimilarity: (K + 1,) from the compared keyframes.
         pattern: how alike the compared keyframes' pixels are.
+        prints: where its print was found again.
     """
     size = count + 1
     owner = np.where(is_met, instance_of_voxel, 0)
@@ -160,5 +166,6 @@ def object_evidence(
         dissimilarity=dissimilarity,
         pattern_pixels=pattern.weight.copy(),  # goes on growing
         pattern_correlation=pattern.mean_correlation,
-        pattern_lost=pattern.lost_share,
+        print_here=prints.here,
+        print_elsewhere=prints.elsewhere,
     )

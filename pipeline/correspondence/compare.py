@@ -58,11 +58,13 @@ class VisitImages:
         geometry: its front-end output.
         objects: its object map.
         features: stored feature map of a keyframe.
+        image: stored image of a keyframe, (H, W, 3) RGB at processing size.
     """
 
     geometry: SessionGeometry
     objects: SessionObjects
     features: Callable[[int], NDArray[np.float16]]
+    image: Callable[[int], NDArray[np.uint8]]
 
 
 @dataclass(frozen=True)

@@ -39,33 +39,25 @@ class PatternAgreement:
     Attributes:
         weight: pixels that show a pattern, by how far it stands out of the noise.
         correlation: sum of weight times the best local correlation.
-        lost: sum of the weights where the pattern of one visit is not found in the other.
     """
 
     weight: NDArray[np.float64]
     correlation: NDArray[np.float64]
-    lost: NDArray[np.float64]
 
     @classmethod
     def empty(cls, instances: int) -> PatternAgreement:
         """Nothing compared yet for K instances."""
-        return cls(*(np.zeros(instances + 1) for _ in range(3)))
+        return cls(*(np.zeros(instances + 1) for _ in range(2)))
 
     def add(self, other: PatternAgreement) -> None:
         """Add the sums of another comparison."""
         self.weight += other.weight
         self.correlation += other.correlation
-        self.lost += other.lost
 
     @property
     def mean_correlation(self) -> NDArray[np.float64]:
         """(K + 1,) in [-1, 1]; NaN where no pattern was compared."""
         return np.where(self.weight > 0, self.correlation / np.maximum(self.weight, 1e-9), np.nan)
-
-    @property
-    def lost_share(self) -> NDArray[np.float64]:
-        """(K + 1,) in [0, 1]; NaN where no pattern was compared."""
-        return np.where(self.weight > 0, self.lost / np.maximum(self.weight, 1e-9), np.nan)
 
 
 def compare_pattern(
@@ -101,7 +93,6 @@ def compare_pattern(
     instance, weights, values = shown[used], weight[used], local[used]
     agreement.weight += np.bincount(instance, weights, count + 1)
     agreement.correlation += np.bincount(instance, weights * values, count + 1)
-    agreement.lost += np.bincount(instance, weights * (values < settings.same_correlation), count + 1)
     return agreement
 
 

@@ -230,7 +230,7 @@ def test_agreement_is_summed_by_the_submaps_of_the_current_visit(
 ) -> None:
     current = wall(tmp_path / "current", [0.0, 0.1, 0.2])  # submaps of 2 keyframes: 0, 0, 1
     visits = [
-        VisitImages(geometry, everything(geometry), lambda k: None)  # type: ignore[arg-type,return-value]
+        VisitImages(geometry, everything(geometry), lambda k: None, lambda k: None)  # type: ignore[arg-type,return-value]
         for geometry in (first, current)
     ]
     covisible = SimpleNamespace(
