@@ -274,26 +274,29 @@ class MoveSettings:
     min_rotation_deg: float = setting(
         10.0, "an object turned on the spot by more than this moved", unit="deg"
     )
-    min_log_odds: float = setting(-0.8, "log odds from which two objects are one that moved")
+    min_log_odds: float = setting(-1.6, "log odds from which two objects are one that moved")
     # Weights of association.moves, from benchmarks/fit_move_score.py on scenes that no table reports.
-    bias: float = setting(-4.82, "log odds that two objects are one before any evidence")
+    bias: float = setting(-3.02, "log odds that two objects are one before any evidence")
     overlap_more_weight: float = setting(
-        0.74, "log odds for the larger share of visible surface that is shared"
+        -0.36, "log odds for the larger share of visible surface that is shared"
     )
-    overlap_less_weight: float = setting(-1.04, "log odds for the smaller share of visible surface shared")
-    shared_weight: float = setting(5.24, "log odds for the share of the smaller cloud that is shared")
-    likelihood_weight: float = setting(0.21, "log odds per log likelihood ratio of the colours")
-    likelihood_shared_weight: float = setting(0.49, "the same, where much of the surface is shared")
-    texture_correlation_weight: float = setting(1.66, "log odds per Fisher-transformed texture correlation")
-    texture_weight: float = setting(0.35, "log odds for a textured surface")
-    gain_weight: float = setting(-3.01, "log odds per log unit of brightness gain")
-    reach_ratio_weight: float = setting(-0.34, "log odds per log ratio of the level reaches")
-    height_ratio_weight: float = setting(-1.02, "log odds per log ratio of the heights")
-    vacated_weight: float = setting(2.12, "log odds for the share of both places seen to be empty")
-    voxels_weight: float = setting(-0.24, "log odds per log voxel of the smaller object")
-    chroma_rank_weight: float = setting(-0.55, "log odds per log share of pairs of colours as like")
-    print_weight: float = setting(1.5, "log odds per log number of places of a print that both show")
-    agreement_rank_weight: float = setting(0.11, "log odds per log share of pairs that agree as well")
+    overlap_less_weight: float = setting(-0.2, "log odds for the smaller share of visible surface shared")
+    shared_weight: float = setting(3.01, "log odds for the share of the smaller cloud that is shared")
+    likelihood_weight: float = setting(0.34, "log odds per log likelihood ratio of the colours")
+    likelihood_shared_weight: float = setting(-0.11, "the same, where much of the surface is shared")
+    texture_correlation_weight: float = setting(0.04, "log odds per Fisher-transformed texture correlation")
+    texture_weight: float = setting(1.39, "log odds for a textured surface")
+    gain_weight: float = setting(-1.79, "log odds per log unit of brightness gain")
+    reach_ratio_weight: float = setting(-0.63, "log odds per log ratio of the level reaches")
+    height_ratio_weight: float = setting(-0.87, "log odds per log ratio of the heights")
+    vacated_weight: float = setting(1.93, "log odds for the share of both places seen to be empty")
+    voxels_weight: float = setting(0.03, "log odds per log voxel of the smaller object")
+    chroma_rank_weight: float = setting(-0.63, "log odds per log share of pairs of colours as like")
+    print_weight: float = setting(2.22, "log odds per log number of places of a print that both show")
+    print_expected_weight: float = setting(
+        -0.97, "log odds per log number of places where both should show the same print"
+    )
+    agreement_rank_weight: float = setting(-0.25, "log odds per log share of pairs that agree as well")
 
 
 @dataclass(frozen=True)
@@ -312,8 +315,8 @@ class ChangeSettings:
     texture_weight: float = setting(1.99, "log odds per spread of lost texture correlation")
     tail_weight: float = setting(1.01, "log odds per spread of the share of unexplained colours")
     pattern_weight: float = setting(1.73, "log odds per spread of lost fine pattern")
-    print_here_weight: float = setting(-1.5, "log odds per log number of places whose print stayed here")
-    print_elsewhere_weight: float = setting(1.5, "log odds per log number of places whose print is elsewhere")
+    print_here_weight: float = setting(-1.45, "log odds per log number of places whose print stayed here")
+    print_elsewhere_weight: float = setting(0.8, "log odds per log number of places whose print is elsewhere")
     full_appearance_scale: float = setting(
         0.2, "colour spread between the visits up to which appearance counts fully", unit="log units"
     )

@@ -93,6 +93,15 @@ def register_by_keypoints(
     return found
 
 
+def print_places(keypoints: ObjectKeypoints, spacing_m: float) -> NDArray[np.float64]:
+    """(p, 3) where an object has keypoints, metres; those within a place are one."""
+    if not len(keypoints):
+        return np.zeros((0, 3))
+    place = _place(keypoints.points_world, _PLACE_SPACINGS * spacing_m)
+    sums = np.stack([np.bincount(place, keypoints.points_world[:, axis]) for axis in range(3)], axis=1)
+    return sums / np.bincount(place)[:, None]
+
+
 class _Pool:
     """The keypoints of all objects of a visit, one after the other."""
 

@@ -16,6 +16,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
+from scipy.spatial import cKDTree
 
 from pipeline.association.cloud_agreement import (
     ENOUGH_SHARED,
@@ -24,6 +25,7 @@ from pipeline.association.cloud_agreement import (
 )
 from pipeline.association.keypoint_registration import KeypointRegistration
 from pipeline.association.object_registration import agreement_of, register_objects
+from pipeline.camera import invert_rigid, transform_points
 from pipeline.settings import MoveSettings
 
 _THREADS = 2
@@ -32,6 +34,9 @@ _QUANTILES = np.linspace(0.05, 0.95, 19)
 _CHROMA_AXES = np.array([[1.0, 0.0, -1.0], [1.0, -2.0, 1.0]]) / np.sqrt([[2.0], [6.0]])
 _DIRECTIONS = np.array([[1.0, 0.0], [0.0, 1.0], [0.7, 0.7], [0.7, -0.7]])
 _SIZE_IN_RANKING = 0.1
+# A place with a print lies on a surface within so many spacings of it.
+_ON_SURFACE_SPACINGS = 3.0
+_SURFACE_SAMPLE = 1500
 _FULL_TEXTURE = 0.12
 FEATURES = (
     "overlap_more",
@@ -49,6 +54,7 @@ FEATURES = (
     "chroma_rank",
     "agreement_rank",
     "print",
+    "print_expected",
 )
 
 
@@ -61,10 +67,12 @@ class Candidate:
         cloud: what its visit saw of it.
         seen_through: share of its place that the other visit saw to be empty.
         voxel_count: of the instance.
+        print_places: (p, 3) where it has keypoints, metres.
     """
 
     instance: int
     cloud: ObjectCloud
+    print_places: NDArray[np.float64]
     seen_through: float
     voxel_count: int
 
@@ -162,7 +170,10 @@ def score_moves(
     moves = []
     for pair, registration, *ranks in zip(pairs, registrations, chroma_rank, agreement_rank, strict=True):
         support = pair.printed.support if pair.printed is not None else 0.0
-        features = np.array([*_features(pair, registration), *ranks, np.log1p(support)])
+        expected = _expected_support(pair, registration.T_world_motion, spacing_m)
+        features = np.array(
+            [*_features(pair, registration), *ranks, np.log1p(support), np.log1p(expected)]
+        )
         log_odds = settings.bias + float(weights @ features)
         moves.append(
             ScoredMove(pair.previous.instance, pair.current.instance, registration, features, log_odds)
@@ -263,6 +274,22 @@ def _features(pair: _Pair, found: ObjectRegistration) -> list[float]:
         min(pair.previous.seen_through, pair.current.seen_through),
         float(np.log(max(1, min(pair.previous.voxel_count, pair.current.voxel_count)))),
     ]
+
+
+def _expected_support(pair: _Pair, T_world_motion: NDArray[np.float64], spacing_m: float) -> int:
+    """Places with a print that lie on the other object's surface: were they one, most would agree."""
+    before, after = pair.previous, pair.current
+    counts = []
+    for own, other, T in (
+        (before, after, T_world_motion),
+        (after, before, invert_rigid(T_world_motion)),
+    ):
+        if not len(own.print_places):
+            return 0
+        surface = cKDTree(other.cloud.sampled(_SURFACE_SAMPLE).points_world)
+        distance, _ = surface.query(transform_points(T, own.print_places), k=1)
+        counts.append(int((distance < _ON_SURFACE_SPACINGS * spacing_m).sum()))
+    return min(counts)
 
 
 def _chroma_quantiles(cloud: ObjectCloud) -> NDArray[np.float64]:

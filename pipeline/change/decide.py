@@ -200,6 +200,7 @@ def _scored_moves(
             Candidate(
                 int(instance),
                 of_visit.of(int(instance)),
+                places[int(instance)],
                 float(evidence.objects.seen_through[instance]),
                 int(evidence.objects.voxel_count[instance]),
             )
@@ -208,7 +209,7 @@ def _scored_moves(
             )
             if instance > 0
         ]
-        for of_visit, evidence in zip(clouds, final, strict=True)
+        for of_visit, evidence, places in zip(clouds, final, prints.places, strict=True)
     ]
     up_world = visits[0].geometry.surface.up_world
     return score_moves(

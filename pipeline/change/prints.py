@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.association.keypoint_registration import KeypointRegistration, register_by_keypoints
+from pipeline.association.keypoint_registration import KeypointRegistration, print_places, register_by_keypoints
 from pipeline.association.object_keypoints import no_keypoints, object_keypoints
 from pipeline.correspondence.compare import VisitImages
 from pipeline.settings import Settings
@@ -34,12 +34,14 @@ class Prints:
     Attributes:
         registrations: by previous and current instance, counted from 1.
         counts: K of either visit.
+        places: of every instance of either visit, (p, 3) where it has keypoints; entry 0 is background.
         is_still: by the same keys, whether the print stayed where it was.
     """
 
     registrations: Mapping[tuple[int, int], KeypointRegistration]
     is_still: Mapping[tuple[int, int], bool]
     counts: tuple[int, int]
+    places: tuple[list[NDArray[np.float64]], list[NDArray[np.float64]]]
 
     def support(self, is_met: NDArray[np.bool_]) -> tuple[PrintSupport, PrintSupport]:
         """Of the objects of both visits, by the current objects that have been met, (K1 + 1,)."""
@@ -71,4 +73,6 @@ def find_prints(
     registrations = register_by_keypoints(keypoints[0], keypoints[1], spacing_m)
     limits = (settings.change.tau_d_m, settings.moves.min_rotation_deg)
     is_still = {pair: found.is_still(*limits) for pair, found in registrations.items()}
-    return Prints(registrations, is_still, (previous.objects.count, current.objects.count))
+    places = [[print_places(of_object, spacing_m) for of_object in of_visit] for of_visit in keypoints]
+    counts = (previous.objects.count, current.objects.count)
+    return Prints(registrations, is_still, counts, (places[0], places[1]))
