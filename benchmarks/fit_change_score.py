@@ -24,7 +24,17 @@ from pipeline.result import ChangeLabel
 from pipeline.settings import ChangeSettings
 from pipeline.store import open_result
 
-NAMES = ("bias", "seen_through", "dissimilarity", "residual", "texture", "tail", "pattern", "print_here", "print_elsewhere")
+NAMES = (
+    "bias",
+    "seen_through",
+    "dissimilarity",
+    "residual",
+    "texture",
+    "tail",
+    "pattern",
+    "print_here",
+    "print_elsewhere",
+)
 MIN_COVERAGE = 0.3
 RIDGE = 0.02
 NEWTON_STEPS = 60
@@ -62,7 +72,8 @@ def read_examples(folder: Path) -> Examples:
     trust = appearance_trust(result.manifest["quality"]["appearance_scale_log"], ChangeSettings())
     evidence = [ObjectEvidence.from_table(session.evidence) for session in result.sessions]  # type: ignore[attr-defined]
     # Colours and patches count as far as the visits' colours agree, geometry and patterns always.
-    values = [change_features(of_visit) * np.array([1.0, *[trust] * 4, 1.0, 1.0, 1.0]) for of_visit in evidence]
+    trusted = np.array([1.0, *[trust] * 4, 1.0, 1.0, 1.0])
+    values = [change_features(of_visit) * trusted for of_visit in evidence]
     features, changed, weight = [], [], []
     for found in instance_truths(result, truth):
         counts = np.bincount(found.labels, minlength=256)[: ChangeLabel.MOVED + 1]

@@ -269,7 +269,9 @@ class MoveSettings:
     partners_per_object: int = setting(6, "likest candidates that an object is laid over", least=1)
     max_registrations: int = setting(250, "most pairs of objects that are laid over each other", least=1)
     least_print_support: float = setting(
-        1.5, "two objects whose prints agree in so many places are laid over each other by them", unit="places"
+        1.5,
+        "prints that agree in so many places say how two objects are laid over each other",
+        unit="places",
     )
     min_rotation_deg: float = setting(
         10.0, "an object turned on the spot by more than this moved", unit="deg"

@@ -46,7 +46,7 @@ from pipeline.settings import Settings
 from pipeline.store import ResultWriter, finished_result
 
 # Changes whenever the same inputs and settings would give another result.
-ENGINE_VERSION = 3
+ENGINE_VERSION = 4
 VISITS = ("previous", "current")
 REGISTERED = 2  # the current visit's geometry, fused anew with corrected poses
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.association.object_keypoints import ObjectKeypoints
+from pipeline.association.object_keypoints import ObjectKeypoints, no_keypoints
 from pipeline.camera import rotation_angle_rad, transform_points
 
 _LEAST_SIMILARITY = 0.8
@@ -111,8 +111,9 @@ class _Pool:
         self.owner = np.repeat(np.arange(len(objects)), counts)
         self.first = np.cumsum([0, *counts])
         self.count = int(self.first[-1])
-        self._descriptors = np.concatenate([keypoints.descriptors for keypoints in objects] or [[]])
-        self._log_sizes = np.log(np.concatenate([keypoints.sizes_m for keypoints in objects] or [[]]))
+        everything = [no_keypoints(), *objects]
+        self._descriptors = np.concatenate([keypoints.descriptors for keypoints in everything])
+        self._log_sizes = np.log(np.concatenate([keypoints.sizes_m for keypoints in everything]))
         self._log_sizes = self._log_sizes.astype(np.float32)
 
     def similarity_to(self, keypoints: ObjectKeypoints) -> NDArray[np.float32]:

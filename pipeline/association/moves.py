@@ -171,9 +171,7 @@ def score_moves(
     for pair, registration, *ranks in zip(pairs, registrations, chroma_rank, agreement_rank, strict=True):
         support = pair.printed.support if pair.printed is not None else 0.0
         expected = _expected_support(pair, registration.T_world_motion, spacing_m)
-        features = np.array(
-            [*_features(pair, registration), *ranks, np.log1p(support), np.log1p(expected)]
-        )
+        features = np.array([*_features(pair, registration), *ranks, np.log1p(support), np.log1p(expected)])
         log_odds = settings.bias + float(weights @ features)
         moves.append(
             ScoredMove(pair.previous.instance, pair.current.instance, registration, features, log_odds)

@@ -14,12 +14,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.camera import rotate_points, transform_points
+from pipeline.camera import PinholeCamera, rotate_points, transform_points
 from pipeline.mapping.front_end import SessionGeometry
 from pipeline.mapping.objects import SessionObjects
 
 _VIEWS_PER_OBJECT = 5
-_MAX_PER_VIEW, _MAX_PER_OBJECT = 250, 400
+# All keypoints of a visit are compared with all of the other: the more objects, the fewer of each.
+_KEYPOINTS_PER_VISIT = 60_000
+_KEYPOINTS_PER_VIEW = (30, 250)
 _MARGIN_PX = 12
 _CONTRAST = 0.02
 # Seen at a flatter angle, a keypoint's neighbourhood is too foreshortened to be found again.
@@ -66,67 +68,85 @@ def object_keypoints(
         geometry, objects: of the visit.
         image: (H, W, 3) RGB of a keyframe at processing size.
     """
+    most = np.clip(_KEYPOINTS_PER_VISIT // (objects.count * _VIEWS_PER_OBJECT), *_KEYPOINTS_PER_VIEW)
     pixels = objects.view_pixels[:, instance]
     views = np.argsort(-pixels, kind="stable")[:_VIEWS_PER_OBJECT]
     found = [
-        _of_view(geometry, objects.mask(geometry, k) == instance, image(k), k)
+        _of_view(geometry, objects.mask(geometry, k) == instance, image(k), k, int(most))
         for k in views[pixels[views] > 0].tolist()
     ]
-    found = [keypoints for keypoints in found if len(keypoints)]
     if not found:
         return no_keypoints()
     return ObjectKeypoints(
-        *(
-            np.concatenate([getattr(keypoints, name) for keypoints in found])
-            for name in ("points_world", "R_world_keypoint", "sizes_m", "descriptors")
-        )
+        np.concatenate([of_view.points_world for of_view in found]),
+        np.concatenate([of_view.R_world_keypoint for of_view in found]),
+        np.concatenate([of_view.sizes_m for of_view in found]),
+        np.concatenate([of_view.descriptors for of_view in found]),
     )
 
 
 def _of_view(
-    geometry: SessionGeometry, is_object: NDArray[np.bool_], rgb: NDArray[np.uint8], k: int
+    geometry: SessionGeometry, is_object: NDArray[np.bool_], rgb: NDArray[np.uint8], k: int, most: int
 ) -> ObjectKeypoints:
-    stride = geometry.stride
-    rows, columns = np.nonzero(is_object)
-    top, left = max(0, rows.min() * stride - _MARGIN_PX), max(0, columns.min() * stride - _MARGIN_PX)
-    bottom, right = rows.max() * stride + _MARGIN_PX, columns.max() * stride + _MARGIN_PX
-    grey = cv2.cvtColor(np.ascontiguousarray(rgb[top:bottom, left:right]), cv2.COLOR_RGB2GRAY)
-    sift = cv2.SIFT_create(_MAX_PER_VIEW, 3, _CONTRAST)
-    keypoints, descriptors = sift.detectAndCompute(grey, None)
-    if descriptors is None or not len(keypoints):
-        return no_keypoints()
-    pixel = np.array([keypoint.pt for keypoint in keypoints]) + [left, top]
-    diameter, angle = np.array([(keypoint.size, np.deg2rad(keypoint.angle)) for keypoint in keypoints]).T
-    cell = np.clip(np.round(pixel / stride).astype(int), 0, [is_object.shape[1] - 1, is_object.shape[0] - 1])
+    pixel, diameter_px, angle_rad, descriptors = _detected(rgb, is_object, geometry.stride, most)
+    last_row, last_column = np.array(is_object.shape) - 1
+    cell = np.clip(np.round(pixel / geometry.stride).astype(np.int64), 0, [last_column, last_row])
     depth, voxels = geometry.store.depth(k), geometry.store.voxels(k)
-    column, row = cell.T
-    kept = is_object[row, column] & (depth[row, column] > 0)
+    is_on = is_object[cell[:, 1], cell[:, 0]] & (depth[cell[:, 1], cell[:, 0]] > 0)
+    if not is_on.any():
+        return no_keypoints()
+    pixel, angle_rad = pixel[is_on], angle_rad[is_on]
+    diameter_px, descriptors = diameter_px[is_on], descriptors[is_on]
+    at = cell[is_on, 1], cell[is_on, 0]
     camera, T = geometry.keyframes[k].camera, geometry.keyframes[k].T_world_camera
-    pixel, diameter, angle, row, column = pixel[kept], diameter[kept], angle[kept], row[kept], column[kept]
-    z = depth[row, column].astype(np.float64)
-    normals = rotate_points(T[:3, :3].T, geometry.surface.normals_world[voxels[row, column]].astype(np.float64))
-    focal = np.array([camera.fx, camera.fy])
-    ray = np.column_stack([(pixel - [camera.cx, camera.cy]) / focal, np.ones(len(pixel))])
-    points = ray * z[:, None]
-    ahead = ray + np.column_stack([np.cos(angle) / camera.fx, np.sin(angle) / camera.fy, np.zeros(len(ray))])
-    # Where the neighbouring ray meets the surface.
-    ahead *= ((points * normals).sum(axis=1) / _away_from_zero((ahead * normals).sum(axis=1)))[:, None]
-    along = ahead - points
-    along -= (along * normals).sum(axis=1, keepdims=True) * normals
-    length = np.linalg.norm(along, axis=1)
-    cosine = -(ray * normals).sum(axis=1) / np.linalg.norm(ray, axis=1)
-    good = (cosine > _LEAST_COSINE) & (length > 1e-9)
-    along, normals = along[good] / length[good, None], normals[good]
-    frames = np.stack([along, np.cross(normals, along), normals], axis=2)
-    chosen = np.flatnonzero(kept)[good]
-    root = np.sqrt(descriptors[chosen] / np.maximum(descriptors[chosen].sum(axis=1, keepdims=True), 1e-9))
+    normals = rotate_points(T[:3, :3].T, geometry.surface.normals_world[voxels[at]].astype(np.float64))
+    points, frames, is_seen_well = _lifted(camera, pixel, angle_rad, depth[at], normals)
+    root = np.sqrt(descriptors / np.maximum(descriptors.sum(axis=1, keepdims=True), 1e-9))
     return ObjectKeypoints(
-        transform_points(T, points[good]).astype(np.float64),
-        T[:3, :3] @ frames,
-        (diameter[good] * z[good] / camera.fx).astype(np.float64),
-        root.astype(np.float32),
+        transform_points(T, points[is_seen_well]).astype(np.float64),
+        T[:3, :3] @ frames[is_seen_well],
+        (diameter_px * points[:, 2] / camera.fx)[is_seen_well],
+        root[is_seen_well].astype(np.float32),
     )
 
 
-def _away_from_zero(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.where(np.abs(values) < 1e-6, 1e-6, values)
+def _detected(
+    rgb: NDArray[np.uint8], is_object: NDArray[np.bool_], stride: int, most: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float32]]:
+    """Pixels (n, 2), diameters (pixels), directions (radians) and SIFT descriptors around an object."""
+    rows, columns = np.nonzero(is_object)
+    top, left = (max(0, int(low.min()) * stride - _MARGIN_PX) for low in (rows, columns))
+    bottom, right = (int(high.max()) * stride + _MARGIN_PX for high in (rows, columns))
+    grey = cv2.cvtColor(np.ascontiguousarray(rgb[top:bottom, left:right]), cv2.COLOR_RGB2GRAY)
+    sift = cv2.SIFT_create(most, contrastThreshold=_CONTRAST)  # type: ignore[attr-defined]  # not in its stubs
+    keypoints, descriptors = sift.detectAndCompute(grey, None)
+    if descriptors is None:
+        return np.zeros((0, 2)), np.zeros(0), np.zeros(0), np.zeros((0, DESCRIPTOR_SIZE), np.float32)
+    found = np.array([(*keypoint.pt, keypoint.size, keypoint.angle) for keypoint in keypoints])
+    pixel = found[:, :2] + np.array([left, top])
+    return pixel, found[:, 2], np.deg2rad(found[:, 3]), descriptors
+
+
+def _lifted(
+    camera: PinholeCamera,
+    pixel: NDArray[np.float64],
+    angle_rad: NDArray[np.float64],
+    depth_m: NDArray[np.floating],
+    normals: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
+    """Points (n, 3), frames (n, 3, 3) and which are seen at a good angle; camera frame, metres."""
+    scale = np.array([camera.fx, camera.fy])
+    level = np.zeros(len(pixel))
+    ray = np.column_stack([(pixel - [camera.cx, camera.cy]) / scale, level + 1])
+    points = ray * depth_m[:, None]
+    # Where the ray of the neighbouring pixel meets the surface.
+    step = np.column_stack([np.cos(angle_rad) / camera.fx, np.sin(angle_rad) / camera.fy, level])
+    towards = ((ray + step) * normals).sum(axis=1)
+    towards = np.where(np.abs(towards) < 1e-6, 1e-6, towards)
+    along = (ray + step) * ((points * normals).sum(axis=1) / towards)[:, None] - points
+    along -= (along * normals).sum(axis=1, keepdims=True) * normals
+    length = np.linalg.norm(along, axis=1)
+    along /= np.maximum(length, 1e-12)[:, None]
+    cosine = -(ray * normals).sum(axis=1) / np.linalg.norm(ray, axis=1)
+    frames = np.stack([along, np.cross(normals, along), normals], axis=2)
+    return points, frames, (cosine > _LEAST_COSINE) & (length > 1e-9)

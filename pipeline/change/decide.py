@@ -80,14 +80,20 @@ def decide(
             so_far.add(added[submap])
         is_met = current.geometry.first_keyframe <= last_keyframe[submap]
         is_met_object = np.bincount(current.objects.instance_of_voxel, is_met, current.objects.count + 1) > 0
-        printed = prints.support(is_met_object)
+        prints0, prints1 = prints.support(is_met_object)
         dissimilarity = [change_of_similarity(s.mean, extractor.similarity) for s in similarity]
         compared0 = _compared(previous, seen_so_far, settings)
         evidence0 = _visit_evidence(
-            previous, compared0, ~observation.is_noise0, dissimilarity[0], pattern[0], printed[0], settings
+            previous, compared0, ~observation.is_noise0, dissimilarity[0], pattern[0], prints0, settings
         )
         evidence1 = _visit_evidence(
-            current, compared1, is_met & ~observation.is_noise1, dissimilarity[1], pattern[1], printed[1], settings
+            current,
+            compared1,
+            is_met & ~observation.is_noise1,
+            dissimilarity[1],
+            pattern[1],
+            prints1,
+            settings,
         )
         evidence.append((evidence0, evidence1))
         if settings.change.rule == "paper":

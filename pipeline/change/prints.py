@@ -8,7 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.association.keypoint_registration import KeypointRegistration, print_places, register_by_keypoints
+from pipeline.association.keypoint_registration import (
+    KeypointRegistration,
+    print_places,
+    register_by_keypoints,
+)
 from pipeline.association.object_keypoints import no_keypoints, object_keypoints
 from pipeline.correspondence.compare import VisitImages
 from pipeline.settings import Settings
@@ -54,9 +58,7 @@ class Prints:
         return sums[0], sums[1]
 
 
-def find_prints(
-    previous: VisitImages, current: VisitImages, spacing_m: float, settings: Settings
-) -> Prints:
+def find_prints(previous: VisitImages, current: VisitImages, spacing_m: float, settings: Settings) -> Prints:
     """Compare the prints of all objects of two visits.
 
     Args:
