@@ -99,7 +99,7 @@ def _of_view(
     diameter_px, descriptors = diameter_px[is_on], descriptors[is_on]
     at = cell[is_on, 1], cell[is_on, 0]
     camera, T = geometry.keyframes[k].camera, geometry.keyframes[k].T_world_camera
-    normals = rotate_points(T[:3, :3].T, geometry.surface.normals_world[voxels[at]].astype(np.float64))
+    normals = rotate_points(T[:3, :3].T, geometry.surface.normals_world[voxels[at]])
     points, frames, is_seen_well = _lifted(camera, pixel, angle_rad, depth[at], normals)
     root = np.sqrt(descriptors / np.maximum(descriptors.sum(axis=1, keepdims=True), 1e-9))
     return ObjectKeypoints(
@@ -132,7 +132,7 @@ def _lifted(
     pixel: NDArray[np.float64],
     angle_rad: NDArray[np.float64],
     depth_m: NDArray[np.floating],
-    normals: NDArray[np.float64],
+    normals: NDArray[np.floating],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]:
     """Points (n, 3), frames (n, 3, 3) and which are seen at a good angle; camera frame, metres."""
     scale = np.array([camera.fx, camera.fy])
