@@ -20,6 +20,8 @@ from pipeline.camera import rotation_angle_rad, transform_points
 
 _LEAST_SIMILARITY = 0.8
 _SIZE_RATIO = 1.6
+# Where a rival is alike to the last bit, rounding must not decide.
+_LEAST_MARGIN = 0.01
 # Two keypoints are at one place within so many spacings of the cloud, and their axes within 37 degrees.
 _REACH_SPACINGS = 2.5
 _SAME_AXIS = 0.8
@@ -79,7 +81,8 @@ def register_by_keypoints(
         similarity = all1.similarity_to(keypoints)
         rival = np.maximum(rival0[all0.owner == position][:, None], rival1[None])
         row, column = np.nonzero(similarity > rival)
-        weight = (similarity[row, column] - rival[row, column]) / (1 - rival[row, column])
+        margin = np.maximum(1 - rival[row, column], _LEAST_MARGIN)
+        weight = (similarity[row, column] - rival[row, column]) / margin
         owner = all1.owner[column]
         for other in np.unique(owner):
             mine = owner == other
@@ -132,8 +135,7 @@ class _Pool:
                 similarity = self.similarity_to(keypoints)
                 similarity[:, own] = 0
                 rivals[own] = np.maximum(rivals[own], similarity.max(axis=1))
-        # The last bits of a cosine of two equal vectors must not make a rival's weight infinite.
-        return np.minimum(rivals, np.float32(0.999))
+        return rivals
 
 
 @dataclass(frozen=True)

@@ -163,7 +163,7 @@ def test_fit_of_moves_finds_the_weights_that_made_the_pairs() -> None:
     import fit_move_score
 
     rng = np.random.default_rng(0)
-    features = rng.normal(size=(4000, len(FEATURES))) * np.linspace(0.2, 2, len(FEATURES))
+    features = rng.normal(size=(4000, len(FEATURES))) * np.linspace(0.4, 2, len(FEATURES))
     features[:, FEATURES.index("voxels")] = np.log(2000)
     true = np.zeros(len(FEATURES))
     true[[0, 3, 5]] = 3.0, -1.0, 2.0

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from pipeline.association import moves as module
 from pipeline.association.cloud_agreement import ObjectCloud, ObjectRegistration
+from pipeline.association.keypoint_registration import KeypointRegistration
 from pipeline.association.moves import (
     FEATURES,
     Candidate,
@@ -47,11 +48,42 @@ def cloud(colour: np.ndarray, size: tuple = (0.4, 0.3, 0.5), at: tuple = (0, 0, 
 
 
 def candidate(instance: int, of: ObjectCloud, seen_through: float = 0.9, voxels: int = 400) -> Candidate:
-    return Candidate(instance, of, seen_through, voxels)
+    return Candidate(instance, of, np.zeros((0, 3)), seen_through, voxels)
 
 
 def pairs(scored: list[ScoredMove]) -> set[tuple[int, int]]:
     return {(move.previous, move.current) for move in scored}
+
+
+def test_objects_of_one_print_are_laid_over_each_other_by_it_whatever_their_colours() -> None:
+    T = np.eye(4)
+    T[:3, 3] = [2.0, 1.0, 0.0]
+    left = candidate(1, cloud(RED))
+    taken = [candidate(1, cloud(BLUE, at=(2, 1, 0))), candidate(2, cloud(BLUE, at=(4, 1, 0)))]
+    agreed = KeypointRegistration(T, 2.2, 6.0)
+
+    (move,) = score_moves([left], taken, UP, SPACING_M, {(1, 1): agreed}, SETTINGS)
+
+    assert (move.previous, move.current) == (1, 1)
+    assert move.registration.T_world_motion.tolist() == T.tolist()
+    assert move.features[FEATURES.index("print")] == pytest.approx(np.log(7))
+    chance = {(1, 1): replace(agreed, support=1.0)}
+    assert not score_moves([left], taken, UP, SPACING_M, chance, SETTINGS)
+
+
+def test_a_print_that_both_should_show_and_do_not_counts_against_a_move() -> None:
+    there = cloud(RED, at=(2, 1, 0))
+    left = replace(candidate(1, cloud(RED)), print_places=cloud(RED).points_world[::40])
+    taken = replace(candidate(1, there), print_places=there.points_world[::40])
+    plain = replace(taken, print_places=np.zeros((0, 3)))
+
+    expected, unexpected = (
+        score_moves([left], [other], UP, SPACING_M, {}, SETTINGS)[0] for other in (taken, plain)
+    )
+
+    assert expected.features[FEATURES.index("print_expected")] > np.log(len(taken.print_places) / 2)
+    assert unexpected.features[FEATURES.index("print_expected")] == 0
+    assert expected.log_odds < unexpected.log_odds
 
 
 def test_objects_of_other_colours_or_sizes_are_not_laid_over_each_other() -> None:
@@ -59,7 +91,7 @@ def test_objects_of_other_colours_or_sizes_are_not_laid_over_each_other() -> Non
     left = [candidate(1, red), candidate(2, cloud(BLUE)), candidate(3, cloud(RED, size=(0.1, 0.08, 0.5)))]
     taken = [candidate(1, cloud(RED, at=(2, 0, 0))), candidate(4, cloud(RED, size=(0.4, 0.3, 0.12)))]
 
-    scored = score_moves(left, taken, UP, SPACING_M, SETTINGS)
+    scored = score_moves(left, taken, UP, SPACING_M, {}, SETTINGS)
 
     # Blue is not red; what is 4 times as small in one direction is another thing.
     assert pairs(scored) == {(1, 1)}
@@ -68,19 +100,19 @@ def test_objects_of_other_colours_or_sizes_are_not_laid_over_each_other() -> Non
 def test_brightness_alone_does_not_rule_a_pair_out() -> None:
     darker = cloud(RED - 0.5, at=(2, 0, 0))
 
-    assert pairs(score_moves([candidate(1, cloud(RED))], [candidate(1, darker)], UP, SPACING_M, SETTINGS))
+    assert pairs(score_moves([candidate(1, cloud(RED))], [candidate(1, darker)], UP, SPACING_M, {}, SETTINGS))
 
 
 def test_nobody_left_or_nothing_taken_scores_nothing() -> None:
     one = [candidate(1, cloud(RED))]
 
-    assert score_moves([], one, UP, SPACING_M, SETTINGS) == []
-    assert score_moves(one, [], UP, SPACING_M, SETTINGS) == []
+    assert score_moves([], one, UP, SPACING_M, {}, SETTINGS) == []
+    assert score_moves(one, [], UP, SPACING_M, {}, SETTINGS) == []
 
 
 def test_log_odds_are_the_weighted_features_and_the_table_keeps_both() -> None:
     left = [candidate(1, cloud(RED)), candidate(2, cloud(RED, print_seed=5))]
-    scored = score_moves(left, [candidate(1, cloud(RED, at=(2, 1, 0)))], UP, SPACING_M, SETTINGS)
+    scored = score_moves(left, [candidate(1, cloud(RED, at=(2, 1, 0)))], UP, SPACING_M, {}, SETTINGS)
     table = moves_table(scored, np.array([0, 11, 12]), np.array([0, 31]))
 
     assert table.dtype.names == ("previous_object_id", "current_object_id", *FEATURES, "log_odds")
@@ -97,10 +129,9 @@ def test_what_moved_scores_above_a_look_alike_and_seeing_both_places_empty_speak
     taken = [candidate(1, cloud(RED, at=(2, 1, 0)))]
     left = [candidate(1, cloud(RED)), candidate(2, cloud(RED, print_seed=5))]
 
-    same, other = score_moves(left, taken, UP, SPACING_M, SETTINGS)
-    kept = score_moves([candidate(1, cloud(RED), seen_through=0.0), left[1]], taken, UP, SPACING_M, SETTINGS)[
-        0
-    ]
+    same, other = score_moves(left, taken, UP, SPACING_M, {}, SETTINGS)
+    taken_over = [candidate(1, cloud(RED), seen_through=0.0), left[1]]
+    kept = score_moves(taken_over, taken, UP, SPACING_M, {}, SETTINGS)[0]
 
     assert (same.previous, other.previous) == (1, 2)
     assert same.log_odds > other.log_odds
@@ -127,7 +158,7 @@ def test_each_object_is_laid_over_its_likest_partners_only(laid_over: list[int])
     left = [candidate(i, cloud(GREY + rng.normal(0, 0.01, 3))) for i in range(1, 9)]
     taken = [candidate(i, cloud(GREY + rng.normal(0, 0.01, 3))) for i in range(1, 9)]
 
-    scored = score_moves(left, taken, UP, SPACING_M, replace(SETTINGS, partners_per_object=1))
+    scored = score_moves(left, taken, UP, SPACING_M, {}, replace(SETTINGS, partners_per_object=1))
 
     assert 8 <= len(laid_over) < 40
     # Nobody goes without: every object is laid over its likest partner at least.
@@ -138,7 +169,7 @@ def test_no_more_registrations_than_allowed_and_the_likest_first(laid_over: list
     left = [candidate(1, cloud(RED))]
     taken = [candidate(i, cloud(RED + 0.02 * i * np.array([1, 0, 0]))) for i in range(5)]
 
-    scored = score_moves(left, taken, UP, SPACING_M, replace(SETTINGS, max_registrations=2))
+    scored = score_moves(left, taken, UP, SPACING_M, {}, replace(SETTINGS, max_registrations=2))
 
     assert [move.current for move in scored] == [0, 1]
     assert len(laid_over) == 2

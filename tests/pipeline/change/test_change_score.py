@@ -32,7 +32,8 @@ def unchanged() -> ObjectEvidence:
         dissimilarity=-2.2 + 0.1 * scatter,
         pattern_pixels=np.zeros(OBJECTS),
         pattern_correlation=np.full(OBJECTS, np.nan),
-        pattern_lost=np.full(OBJECTS, np.nan),
+        print_here=np.zeros(OBJECTS),
+        print_elsewhere=np.zeros(OBJECTS),
     )
 
 
@@ -42,7 +43,6 @@ def patterned() -> ObjectEvidence:
         unchanged(),
         pattern_pixels=np.full(OBJECTS, 500.0),
         pattern_correlation=0.8 + 0.02 * np.linspace(-1, 1, OBJECTS),
-        pattern_lost=np.full(OBJECTS, 0.05),
     )
 
 
@@ -104,7 +104,7 @@ def test_few_compared_voxels_say_little() -> None:
 def test_what_was_never_compared_is_judged_by_geometry_alone() -> None:
     features = change_features(with_object(compared_count=0, dissimilarity=np.nan, seen_through=0.2))
 
-    assert features[-1].tolist() == [0.2, 0, 0, 0, 0, 0]
+    assert features[-1].tolist() == [0.2, 0, 0, 0, 0, 0, 0, 0]
 
 
 def test_a_lost_pattern_is_a_change_however_the_visits_colours_agree() -> None:
@@ -115,6 +115,18 @@ def test_a_lost_pattern_is_a_change_however_the_visits_colours_agree() -> None:
     # Without trust in colours the pattern alone is left; its weight is not damped.
     pattern = change_features(lost)[-1, 5]
     assert log_odds(lost, scale=1.0) == pytest.approx(SETTINGS.bias + SETTINGS.pattern_weight * pattern)
+
+
+def test_a_print_found_again_here_speaks_against_a_change_and_elsewhere_for_one() -> None:
+    here, elsewhere = with_object(print_here=9.0), with_object(print_elsewhere=9.0)
+
+    nothing = log_odds(unchanged())
+    # log(1 + 9 places), whether the visits' colours agree or not.
+    assert log_odds(here) - nothing == pytest.approx(SETTINGS.print_here_weight * np.log(10))
+    assert log_odds(elsewhere, 1.0) - log_odds(unchanged(), 1.0) == pytest.approx(
+        SETTINGS.print_elsewhere_weight * np.log(10)
+    )
+    assert log_odds(here) < nothing < log_odds(elsewhere)
 
 
 def test_log_odds_rise_as_the_pattern_is_lost() -> None:

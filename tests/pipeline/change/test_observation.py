@@ -15,6 +15,7 @@ from pipeline.change.appearance import AppearanceResidual
 from pipeline.change.evidence import ObjectEvidence, object_evidence
 from pipeline.change.observation import DepthWindow, Glimpse, Observation, glimpse
 from pipeline.change.observe import observe
+from pipeline.change.prints import PrintSupport
 from pipeline.correspondence.pattern import PatternAgreement
 from pipeline.mapping.front_end import SessionGeometry
 from pipeline.mapping.surface import FusedSurface
@@ -175,6 +176,7 @@ def evidence(
         points,
         np.full(max(instances) + 1, np.nan),
         PatternAgreement.empty(max(instances)) if pattern is None else pattern,
+        PrintSupport(np.zeros(max(instances) + 1), np.arange(max(instances) + 1.0)),
     )
 
 
@@ -197,11 +199,11 @@ def test_evidence_counts_only_what_was_met_so_far() -> None:
 
 
 def test_evidence_keeps_the_pattern_of_its_moment_while_the_sums_go_on_growing() -> None:
-    pattern = PatternAgreement(np.array([0.0, 4.0]), np.array([0.0, 3.0]), np.array([0.0, 1.0]))
+    pattern = PatternAgreement(np.array([0.0, 4.0]), np.array([0.0, 3.0]))
     found = evidence([1, 1], [1, 1], [0, 0], pattern=pattern)
     pattern.add(pattern)
 
-    assert (found.pattern_pixels[1], found.pattern_correlation[1], found.pattern_lost[1]) == (4, 0.75, 0.25)
+    assert (found.pattern_pixels[1], found.pattern_correlation[1]) == (4, 0.75)
     assert np.isnan(found.pattern_correlation[0])
 
 

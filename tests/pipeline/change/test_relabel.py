@@ -85,14 +85,14 @@ def test_pair_that_becomes_one_is_named(small_result: Result, small_result_path:
     motion = np.eye(4)
     motion[0, 3] = 1.5
     arrays["move_pairs"] = np.concatenate([arrays["move_pairs"], [[row, column]]]).astype(np.int32)
-    arrays["move_log_odds"] = np.append(arrays["move_log_odds"], -1.5)
+    arrays["move_log_odds"] = np.append(arrays["move_log_odds"], -3.0)
     arrays["move_T_world_motion"] = np.concatenate([arrays["move_T_world_motion"], motion[None]])
     tables = tuple(session.evidence for session in small_result.sessions)  # type: ignore[attr-defined]
     again = WhatIf(small_result, DecisionBasis.from_arrays(arrays, tables))
 
     assert again.under(SETTINGS).flips == ()
     flips = {
-        flip.object_id: flip for flip in again.under(SETTINGS.override("moves.min_log_odds", -2.0)).flips
+        flip.object_id: flip for flip in again.under(SETTINGS.override("moves.min_log_odds", -4.0)).flips
     }
     assert (flips[9].joins, flips[12].joins) == (12, 9)
     assert flips[9].labels == flips[12].labels == (L.MOVED,)

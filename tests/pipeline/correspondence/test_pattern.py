@@ -62,12 +62,12 @@ def test_the_same_print_a_pixel_or_two_off_correlates(shift: tuple[int, int]) ->
 
 
 def test_the_same_print_further_off_than_the_poses_err_does_not() -> None:
-    assert weighted(view(0), view(0, 8, 8)) < SETTINGS.same_correlation
+    assert weighted(view(0), view(0, 8, 8)) < 0.6
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_another_print_does_not_correlate(seed: int) -> None:
-    assert weighted(view(0), view(seed)) < SETTINGS.same_correlation
+    assert weighted(view(0), view(seed)) < 0.6
 
 
 def test_light_and_shading_are_no_pattern() -> None:
@@ -111,14 +111,12 @@ def test_pixels_that_do_not_show_the_same_surface_have_no_say() -> None:
 def test_sums_add_up_and_say_nothing_where_nothing_was_compared() -> None:
     total = PatternAgreement.empty(2)
     assert np.isnan(total.mean_correlation).all()
-    assert np.isnan(total.lost_share).all()
 
-    total.add(PatternAgreement(np.array([0, 4.0, 0]), np.array([0, 3.0, 0]), np.array([0, 1.0, 0])))
-    total.add(PatternAgreement(np.array([0, 4.0, 0]), np.array([0, -1.0, 0]), np.array([0, 3.0, 0])))
+    total.add(PatternAgreement(np.array([0, 4.0, 0]), np.array([0, 3.0, 0])))
+    total.add(PatternAgreement(np.array([0, 4.0, 0]), np.array([0, -1.0, 0])))
 
     assert total.weight.tolist() == [0, 8, 0]
     assert total.mean_correlation[1] == pytest.approx(0.25)
-    assert total.lost_share[1] == pytest.approx(0.5)
     assert np.isnan(total.mean_correlation[[0, 2]]).all()
 
 
@@ -212,9 +210,7 @@ def test_print_is_found_again_and_another_print_is_not(first: SessionGeometry, t
     assert (kept.weight[1:3] > 300).all()
     assert kept.weight[0] == kept.weight[3] == 0
     assert (kept.mean_correlation[1:3] > 0.85).all()
-    assert (kept.lost_share[1:3] < 0.05).all()
     assert (lost.mean_correlation[1:3] < 0.5).all()
-    assert (lost.lost_share[1:3] > 0.6).all()
 
 
 def test_keyframes_that_share_next_to_nothing_are_not_compared(
