@@ -113,3 +113,19 @@ def test_damaged_journal_is_one_line_and_no_export(small_result_path: Path, tmp_
     with pytest.raises(ResultError, match=r"review\.sqlite is not a journal"):
         export(small_result_path, "csv", tmp_path / "map.csv")
     assert not (tmp_path / "map.csv").exists()
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_a_place_without_objects_is_exported_too(objectless_path: Path, tmp_path: Path, format: str) -> None:
+    export(objectless_path, format, tmp_path / "out")
+    content = (tmp_path / "out").read_bytes() if (tmp_path / "out").is_file() else b"folder"
+    expected = {
+        "report": b"No objects were found in these visits",
+        "csv": b"id,label_machine,label_final",
+        "json": b"[]",
+        "geojson": b'"features": [\n]}',
+        "coco": b'"annotations": []}',
+        "glb": b"background_session_1",
+        "heatmaps": b"folder",
+    }
+    assert expected.get(format, b"") in content
