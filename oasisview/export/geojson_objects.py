@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oasisview.export.exporter import ReviewedResult, Steps, chunk_count
+from oasisview.export.footprints import Footprint, footprints
 from oasisview.export.georeference import Georeference
-from oasisview.export.ground_plan import Footprint, GroundPlan, footprints
 from oasisview.export.object_rows import object_rows
+from oasisview.scene.ground_plan import GroundPlan
 from pipeline.progress import Report, silent
 from pipeline.store.files import atomic_file
 

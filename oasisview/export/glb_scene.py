@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from oasisview import wording
 from oasisview.export.exporter import ReviewedResult, Steps, chunk_count
-from oasisview.export.ground_plan import GroundPlan
 from oasisview.export.object_points import Key, object_parts
 from oasisview.export.object_rows import object_rows
 from oasisview.export.surfels import OVERLAP, squares, surface_directions, thinned
 from oasisview.palette import LIGHT, label_table
+from oasisview.scene.ground_plan import GroundPlan
 from oasisview.scene.level_of_detail import point_spacing_m, thin
 from oasisview.scene.map_points import muted
 from pipeline.progress import Report, silent

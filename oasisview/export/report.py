@@ -8,11 +8,12 @@ from pathlib import Path
 
 from oasisview.export import report_method, report_words
 from oasisview.export.exporter import ReviewedResult, Steps, chunk_count
-from oasisview.export.ground_plan import GroundPlan, footprints
+from oasisview.export.footprints import footprints
 from oasisview.export.report_cards import ReportCards, unchanged
 from oasisview.export.report_marks import DEFINITIONS, standalone
 from oasisview.export.report_plan import plan_svg
 from oasisview.export.report_words import SECTIONS, Change, numbered_changes, visit_name
+from oasisview.scene.ground_plan import GroundPlan
 from oasisview.shell import escape
 from pipeline.progress import Report, silent
 from pipeline.result import ChangeLabel

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from oasisview.export.exporter import CHUNK_POINTS, ReviewedResult
-from oasisview.export.ground_plan import Footprint, GroundPlan
+from oasisview.export.footprints import Footprint
 from oasisview.export.report_marks import COLOURS, mark
 from oasisview.export.report_words import Change, is_standing
+from oasisview.scene.ground_plan import GroundPlan
 from oasisview.scene.level_of_detail import ceiling_height
 from oasisview.scene.map_points import muted
 from pipeline.result import ChangeLabel, SessionResult
@@ -51,7 +52,8 @@ def plan_svg(
     picture = _picture(session, plan, sheet, ceiling_m)
     encoded, data = cv2.imencode(".jpg", picture[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 82])
     uri = base64.b64encode(data.tobytes()).decode() if encoded else ""
-    radius = float(np.clip(17 * np.sqrt(60 / max(len(changes), 1)), 9, 17))
+    room = sheet.width_px * sheet.height_px / max(len(changes), 1)
+    radius = float(np.clip(0.16 * np.sqrt(room), 9, 16))
     anchors = _anchors(changes, ground, sheet)
     places = _apart(anchors, radius, sheet)
     drawn = [

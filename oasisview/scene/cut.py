@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from oasisview.export.ground_plan import GroundPlan
+from oasisview.scene.ground_plan import GroundPlan
 from oasisview.scene.map_points import MapPoints, VisitPoints
 from pipeline.result import Result
 

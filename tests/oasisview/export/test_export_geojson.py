@@ -13,7 +13,7 @@ from matplotlib.path import Path as Outline
 
 from oasisview.export import export, exporter
 from oasisview.export.georeference import Georeference
-from oasisview.export.ground_plan import GroundPlan
+from oasisview.scene.ground_plan import GroundPlan
 from pipeline.session import GeographicOrigin
 from pipeline.store import open_result
 

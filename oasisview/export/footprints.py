@@ -1,4 +1,4 @@
-"""The place from above: world points on a level plane, and the ground that each object stands on."""
+"""The ground that each object stands on, as an outline seen from above."""
 
 from __future__ import annotations
 
@@ -10,41 +10,9 @@ from scipy.spatial import ConvexHull, QhullError
 
 from oasisview.export.exporter import ReviewedResult, Steps
 from oasisview.export.object_points import object_parts
-from oasisview.scene.viewpoints import horizontal_axes
-from pipeline.result import Result
+from oasisview.scene.ground_plan import GroundPlan
 
-LEVEL_COSINE = np.cos(np.radians(15))  # robots' z axes lean that much at most: then x and y are kept
 LEAST_SIDE_M = 0.01  # of the footprint of what has no area: a wire, a single point
-
-
-@dataclass(frozen=True)
-class GroundPlan:
-    """Two level axes and one against gravity.
-
-    Attributes:
-        axes_world: (3, 3) rows east-like, north-like, up; right-handed unit vectors of the world frame.
-        names: what the three axes are in terms of the world frame.
-    """
-
-    axes_world: NDArray[np.float64]
-    names: tuple[str, str, str]
-
-    @classmethod
-    def of(cls, result: Result) -> GroundPlan:
-        """World x and y where the world's z axis stands about upright, else level axes of our own."""
-        up = np.asarray(result.sessions[-1].up_world, np.float64)
-        if up[2] >= LEVEL_COSINE:
-            return cls(np.eye(3), ("world x", "world y", "world z"))
-        return cls(np.stack([*horizontal_axes(up), up]), ("level u", "level v", "up"))
-
-    @property
-    def is_world(self) -> bool:
-        """Whether the plan's axes are those of the world frame."""
-        return bool(np.array_equal(self.axes_world, np.eye(3)))
-
-    def project(self, points_world: NDArray[np.floating]) -> NDArray[np.float64]:
-        """(N, 3) or (3,) world points along the plan's axes, metres; the last column is height."""
-        return np.asarray(points_world, np.float64) @ self.axes_world.T
 
 
 @dataclass(frozen=True)
