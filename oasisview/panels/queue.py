@@ -46,17 +46,23 @@ def queue_html(
     parts = [f'<div class="oa oa-queue">{_header(catalogue, verdicts, chosen, counted)}']
     if chosen.is_narrow:
         parts.append(_narrowed(order, counted, chosen))
-    for number, title in enumerate(GROUPS):
-        rows = [item for item in order if group(item, verdicts, skipped) == number]
+    is_search = bool(chosen.search.strip())
+    for number, title in enumerate(("Found",) if is_search else GROUPS):
+        rows = [item for item in order if is_search or group(item, verdicts, skipped) == number]
         if rows:
             parts.append(_group_head(title, len(rows)))
             parts += [
                 _row(catalogue, item, verdicts.get(item.object_id), item.object_id in disputed)
                 for item in rows
             ]
-    if dropped and not chosen.is_narrow:
-        parts.append(_group_head("Not objects", len(dropped)))
-        parts += [_dropped_row(entry, entry.object_id in disputed) for entry in dropped]
+    none = [
+        entry
+        for entry in dropped
+        if not chosen.is_narrow or (chosen.number and str(entry.object_id).startswith(chosen.number))
+    ]
+    if none:
+        parts.append(_group_head("Not objects", len(none)))
+        parts += [_dropped_row(entry, entry.object_id in disputed) for entry in none]
     if not counted and not chosen.is_narrow:
         parts.append(empty(wording.NOTHING_IN_QUEUE))
     elif counted and all(item.object_id in verdicts for item in counted):
