@@ -79,6 +79,14 @@ def _restore_button(event_id: int, tip: str) -> str:
     return f'<button class="oa-restore" {sends("restore", event_id)} title="{tip}">back to here</button>'
 
 
+def _sign(event: Event) -> str:
+    """The label that an entry gave; a sign of its own where it is about more, or less, than an object."""
+    sign = {Kind.DROP: "\u00d7", Kind.RESTORE: "\u21ba", Kind.WHAT_IF: "\u2026"}.get(event.kind)
+    if sign is None:
+        return chip(event.new_label)
+    return f'<span class="oa-chip oa-event" aria-hidden="true">{sign}</span>'
+
+
 def _row(
     event: Event, machine: MachineMap, events: Sequence[Event], *, is_undone: bool, is_last: bool
 ) -> str:
@@ -91,7 +99,7 @@ def _row(
     back = "" if is_last else _restore_button(event.id, f"Go back to how it was after entry {event.id}")
     return (
         f'<div class="oa-entry{" oa-undone" if is_undone else ""}" role="button" tabindex="0" '
-        f'data-event="{event.id}" {select}>{chip(event.new_label)}'
+        f'data-event="{event.id}" {select}>{_sign(event if named else subject)}'
         f'<span><span class="oa-what">{number}{escape(event_words(event, machine, target))}{reason}</span>'
         f"<small>{event.id} \u00b7 {escape(event.who)} \u00b7 {escape(when(event.at))}{back}</small></span>"
         "</div>"

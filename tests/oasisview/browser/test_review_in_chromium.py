@@ -355,6 +355,25 @@ def test_searching_by_number_selects_and_typing_decides_nothing(app, view, added
     assert [event.who for event in added()] == ["ben"]
 
 
+def test_selecting_in_the_queue_flies_there_and_shows_the_best_keyframes(app, view) -> None:
+    page, inspector = view.page, inspector_of(app)
+    home = np.array(app.workbench.points.home.position)
+    page.evaluate("() => O('overview')")
+    view.wait_for(lambda: np.allclose(view_client(app).camera.position, home, atol=0.02), "the whole site")
+    select(view, 12)
+    middle = np.array(app.workbench.catalogue.objects[12].sighting(1).centroid_world_m)
+    view.wait_for(
+        lambda: np.linalg.norm(view_client(app).camera.look_at - middle) < 0.5, "the camera to look at it"
+    )
+    away = np.linalg.norm(np.array(view_client(app).camera.position) - middle)
+    assert away < np.linalg.norm(home - middle)
+    choices = inspector.choices
+    assert app.workbench.catalogue.sees_well(choices.session, choices.keyframe, 12)
+    crops = page.locator('[data-evidence="12"] .oa-crops img')
+    expect(crops).to_have_count(2, timeout=PATIENCE_MS)
+    assert min(crops.evaluate_all("images => images.map(image => image.naturalWidth)")) > 0
+
+
 def test_filters_and_skip_and_progress(app, view, added) -> None:
     page = view.page
     if not page.locator(".oa-filters select").first.is_visible():
