@@ -24,6 +24,7 @@ class Layers:
     path: bool = False
     ceiling: bool = False
     background: bool = True
+    ghost: bool = False
 
     def switched(self, name: str, on: bool) -> Layers:
         """A copy with one layer switched; ``ValueError`` if there is none of that name."""
@@ -37,6 +38,7 @@ LAYER_WORDS: Mapping[str, str] = {
     "names": "Names of changed objects",
     "background": "Background points",
     "ceiling": "Ceiling",
+    "ghost": "Ghost: objects of the other visit",
     "keyframes": "Keyframe cameras",
     "path": "Path of the robot",
 }

@@ -17,6 +17,7 @@ from oasisview.panels.hud import Layers
 from oasisview.scene import outlines
 from oasisview.scene.cameras import draw_cameras
 from oasisview.scene.cut import CutBox
+from oasisview.scene.ghost import Ghost
 from oasisview.scene.map_points import GROUND_RGB, MapPoints, Rgb, VisitPoints, muted, object_colours
 from oasisview.scene.marks import Marks
 from oasisview.scene.picking import pick_object
@@ -65,6 +66,7 @@ class MapView:
         self._mode, self._colours, self._layers, self._dark = "after", "label", Layers(), False
         self._clouds: dict[str, viser.PointCloudHandle] = {}
         self._picks: dict[int, viser.BatchedMeshHandle] = {}
+        self._ghost = Ghost(client.scene, points.point_size_m)
         self.marks = Marks(client, catalogue, points, self._shown_label, label_rgb)
 
     def build(self, mode: str, colours: str, layers: Layers, *, dark: bool) -> None:
@@ -137,6 +139,7 @@ class MapView:
                     cloud.colors = self._object_colours(visit)
             self._add_gone()
             self._draw_marks()
+            self._ghost.forget()
             self._apply_visibility()
 
     def set_clickable(self, on: bool) -> None:
@@ -320,6 +323,13 @@ class MapView:
         return self._shows(visit) and not (visit == 0 and self._mode == "both")
 
     def _apply_visibility(self) -> None:
+        # Both shows what differs already.
+        other = {"before": 1, "after": 0}.get(self._mode) if self._layers.ghost else None
+        self._ghost.show(
+            None if other is None else self._visits[other],
+            None if other is None else self._object_colours(other),
+            dark=self._dark,
+        )
         for visit in range(len(self._points.visits)):
             whole = self._whole(visit)
             wanted = {

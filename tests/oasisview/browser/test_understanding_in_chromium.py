@@ -314,3 +314,30 @@ def test_swipes_of_one_viewpoint_move_together_and_let_clicks_through(app, view)
     page.keyboard.press("x")
     expect(page.locator("[data-swipe]")).to_have_count(0, timeout=PATIENCE_MS)
     assert not page.problems
+
+
+def test_the_other_visit_stands_in_the_map_as_a_ghost(app, view) -> None:
+    page = view.page
+    visits = app.workbench.points.visits
+    assert view.client.scene.get_handle_by_name("/map/ghost") is None
+    page.locator("summary", has_text="Layers").click()
+    page.locator('[data-key="ghost"]').check()
+
+    def ghost() -> np.ndarray | None:
+        handle = view.client.scene.get_handle_by_name("/map/ghost")
+        return None if handle is None else np.asarray(handle.points)
+
+    def shows(visit: int) -> bool:
+        drawn, whole = ghost(), visits[visit].objects
+        return drawn is not None and 0 < len(drawn) < len(whole) / 2 and drawn[1] in whole
+
+    view.wait_for(lambda: shows(0), "the earlier visit's objects in the later map")
+    view.wait_js("() => !!window.__viserMutable.nodeRefFromName['/map/ghost']")
+    page.evaluate("() => O('mode', 'before')")
+    view.wait_for(lambda: shows(1), "the later visit's objects in the earlier map")
+    page.evaluate("() => O('mode', 'both')")
+    view.wait_for(lambda: ghost() is None, "no ghost where both are shown")
+    page.evaluate("() => { O('layer', {key: 'ghost', value: false}); O('mode', 'after'); }")
+    view.wait_for(lambda: not inspector_of(app).choices.layers.ghost, "the layer to be off")
+    assert ghost() is None
+    assert not page.problems
