@@ -5,6 +5,7 @@ One place for all of it, so that the queue, the evidence and the journal say the
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from pipeline.result import ChangeLabel, MapObject, MatchCase, Result
@@ -58,6 +59,7 @@ class Limits:
         tau_sigma: least share of matching patches; tau_s: least match quality.
         tau_d_m: largest displacement of an object that stayed, metres.
         nu_min: least share of a place that the other visit must have looked at.
+        move_chance: least chance that two objects are one that moved.
         method: what decided: this engine or a baseline, which has limits of its own.
     """
 
@@ -65,6 +67,7 @@ class Limits:
     tau_s: float
     tau_d_m: float
     nu_min: float
+    move_chance: float = 0.31
     method: str = "oasis"
 
     @classmethod
@@ -73,12 +76,14 @@ class Limits:
         settings = result.manifest.get("settings", {})
         change = settings.get("change", {})
         default = Settings().change
+        moves = settings.get("moves", {})
         matrix = result.score_matrix
         return cls(
             tau_sigma=float(matrix.tau_sigma),
             tau_s=float(matrix.tau_s),
             tau_d_m=float(change.get("tau_d_m", default.tau_d_m)),
             nu_min=float(change.get("nu_min", default.nu_min)),
+            move_chance=1 / (1 + math.exp(-float(moves.get("min_log_odds", Settings().moves.min_log_odds)))),
             method=str(settings.get("run", {}).get("method", "oasis")),
         )
 
@@ -147,121 +152,6 @@ def queue_fact(item: MapObject, label: ChangeLabel) -> str:
         ChangeLabel.MOVED: "moved",
         ChangeLabel.UNKNOWN: "not decided",
     }[label]
-
-
-def why(item: MapObject, limits: Limits) -> str:
-    """Why the machine gave this object its label."""
-    if limits.method != "oasis":
-        return (
-            f"The baseline {limits.method} says so. It does not decide by the patch matches shown here: "
-            "they are what the images say."
-        )
-    match item.label:
-        case ChangeLabel.STATIC:
-            return _why_static(item, limits)
-        case ChangeLabel.MOVED:
-            return _why_moved(item, limits)
-        case ChangeLabel.APPEARED:
-            return _why_one_sided(item, limits, appeared=True)
-        case ChangeLabel.DISAPPEARED:
-            return _why_one_sided(item, limits, appeared=False)
-        case _:
-            return _why_unknown(item, limits)
-
-
-def _match_words(item: MapObject) -> str:
-    return f"{percent(item.sigma)} of its patches match, with quality {item.s_bar:.2f}"
-
-
-def _why_static(item: MapObject, limits: Limits) -> str:
-    if len(item.sightings) < 2:
-        visit = "earlier" if item.sightings and item.sightings[0].session == 0 else "later"
-        return (
-            f"Made out as an object on the {visit} visit only, but its place did not change: "
-            f"only {percent(item.seen_through)} of its volume was seen to be empty on the other visit."
-        )
-    place = ""
-    if item.displacement_m is not None:
-        place = f", within {length(max(item.displacement_m, 0.01))} of where it was"
-    if item.case is MatchCase.CONFIDENT:
-        return f"Same object, same place: {_match_words(item)}{place}."
-    return (
-        f"Same place, nothing changed there{place}: only {percent(item.seen_through)} of its volume was "
-        f"seen to be empty on the other visit. The match alone would not be enough ({_match_words(item)})."
-    )
-
-
-def _why_moved(item: MapObject, limits: Limits) -> str:
-    away = "another place" if item.displacement_m is None else f"{length(item.displacement_m)} away"
-    if item.T_world_motion is not None:
-        return (
-            f"Found again {away}: laid over what stands there, its shape, colours and pattern fit "
-            f"({percent(item.confidence)} sure). Patch by patch, {_match_words(item)}."
-        )
-    if item.case is not MatchCase.CONFIDENT:
-        return (
-            f"Probably the same object in a new place, {away}, but look twice: its patches alone do not "
-            f"show it ({_match_words(item)})."
-        )
-    return (
-        f"Same object, new place: {_match_words(item)}, but it now stands {away} "
-        f"(up to {length(limits.tau_d_m)} counts as in place)."
-    )
-
-
-def _why_one_sided(item: MapObject, limits: Limits, *, appeared: bool) -> str:
-    if item.sigma >= limits.tau_sigma and item.s_bar >= limits.tau_s:
-        visit = "earlier" if appeared else "later"
-        text = (
-            f"Its place changed: {percent(item.coverage)} of it was looked at on the {visit} visit. "
-            f"Something there looks like it ({_match_words(item)}), but is not it."
-        )
-    elif appeared:
-        text = (
-            f"Nothing on the earlier visit matches this object, and {percent(item.coverage)} of its place "
-            "had been looked at then."
-        )
-    else:
-        text = (
-            f"Nothing on the later visit matches this object, and {percent(item.coverage)} of the place "
-            "where it stood was looked at again."
-        )
-    if item.replaces is not None:
-        text += f" It stands where {object_name(item.replaces)} was."
-    if item.replaced_by is not None:
-        text += f" {object_name(item.replaced_by).capitalize()} stands there now."
-    if item.seen_through > 0:
-        visit = "then" if appeared else "the second time"
-        text += f" {percent(item.seen_through)} of its volume was seen to be empty {visit}."
-    return text
-
-
-def _why_unknown(item: MapObject, limits: Limits) -> str:
-    other = "earlier" if item.sighting(0) is None else "later"
-    maybe = "have been there already" if other == "earlier" else "still be there"
-    if item.coverage < 0.005:
-        return f"Nobody looked at this place on the {other} visit: it may {maybe}, or not."
-    if item.coverage < limits.nu_min:
-        return (
-            f"Only {percent(item.coverage)} of this place was looked at on the {other} visit; "
-            f"{percent(limits.nu_min)} are needed. It may {maybe}."
-        )
-    if item.case is MatchCase.PARTIAL:
-        return (
-            f"Not enough to decide. What matches is convincing (quality {item.s_bar:.2f}), but only "
-            f"{percent(item.sigma)} of its patches do; {percent(limits.tau_sigma)} are needed. "
-            "It was probably seen only in part."
-        )
-    if item.case is MatchCase.LOOKALIKE:
-        return (
-            f"Not enough to decide. Something alike is there ({percent(item.sigma)} of the patches match), "
-            f"but the quality of {item.s_bar:.2f} is below {limits.tau_s:.2f}, and its place is not "
-            "clearly changed either."
-        )
-    return (
-        f"Not enough to decide: {_match_words(item)}, and only {percent(item.seen_through)} of its volume "
-        "was seen to be empty on the other visit."
-    )
 
 
 def overridden(label: ChangeLabel, machine: ChangeLabel, who: str) -> str:

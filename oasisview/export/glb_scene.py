@@ -17,6 +17,7 @@ from oasisview.palette import LIGHT, label_table
 from oasisview.scene.ground_plan import GroundPlan
 from oasisview.scene.level_of_detail import point_spacing_m, thin
 from oasisview.scene.map_points import muted
+from oasisview.why import why
 from pipeline.progress import Report, silent
 from pipeline.result import ChangeLabel, SessionResult
 from pipeline.store.files import atomic_file
@@ -84,7 +85,7 @@ def _scene(reviewed: ReviewedResult, clouds: dict[Key, NDArray[np.float32]], ste
     for (session_index, object_id), surface in surfaces.items():
         item = objects[object_id]
         label = reviewed.final[object_id].label
-        row = _flat(extras[object_id], session_index, wording.why(item, limits))
+        row = _flat(extras[object_id], session_index, why(item, limits))
         centre = surface.mean(axis=0)
         normals = surface_directions(surface - centre)
         vertices, faces = squares(surface - centre, normals, OVERLAP * cell_m)

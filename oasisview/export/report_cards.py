@@ -14,6 +14,7 @@ from oasisview.export.report_marks import standalone
 from oasisview.export.report_words import Change, count, decided, is_standing
 from oasisview.object_views import ObjectView, ObjectViews
 from oasisview.shell import escape
+from oasisview.why import why
 from oasisview.wording import Limits
 from pipeline.result import ChangeLabel
 
@@ -85,7 +86,7 @@ class ReportCards:
         return ""
 
     def _why(self, change: Change) -> str:
-        machine = wording.why(change.item, self._limits)
+        machine = why(change.item, self._limits)
         if not change.final.overridden:
             return machine
         who = change.final.decided_by or ""

@@ -15,6 +15,7 @@ from oasisview.panels.candidates import candidates_html, replaced_html
 from oasisview.panels.markup import chip, empty, section
 from oasisview.panels.verdict import undo_html, verdict_html
 from oasisview.shell import escape
+from oasisview.why import rivals_of, why
 from oasisview.wording import CASE_WORDS, LABEL_NAMES, Limits
 from pipeline.result import ChangeLabel, MapObject
 
@@ -42,7 +43,7 @@ def evidence_html(
     label = verdict.label if verdict is not None else item.label
     body = [
         _title(item, label, verdict),
-        _why(item, label, verdict, catalogue.limits),
+        _why(catalogue, item, label, verdict),
         f'<div class="oa-conflict" role="alert">{escape(conflict)}</div>' if conflict else "",
         before_after_html(catalogue, item, swipe=swipe),
         _numbers(item, catalogue.limits),
@@ -71,13 +72,13 @@ def _title(item: MapObject, label: ChangeLabel, verdict: Verdict | None) -> str:
     )
 
 
-def _why(item: MapObject, label: ChangeLabel, verdict: Verdict | None, limits: Limits) -> str:
+def _why(catalogue: Catalogue, item: MapObject, label: ChangeLabel, verdict: Verdict | None) -> str:
     said = ""
     if verdict is not None and not verdict.accepted:
         said = f"<b>{escape(_said(item, verdict))}</b> "
     if verdict is not None and verdict.reason:
         said += f"<q>{escape(verdict.reason)}</q> "
-    reason = escape(wording.why(item, limits))
+    reason = escape(why(item, catalogue.limits, rivals_of(catalogue.result, item)))
     if verdict is not None and verdict.correction:
         reason = f"What the machine saw: {reason}"
     return f'<p class="oa-why oa-{LABEL_NAMES[label]}" data-role="why">{said}{reason}</p>'

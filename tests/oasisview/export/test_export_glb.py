@@ -72,7 +72,7 @@ def test_extras_say_what_each_mesh_is(glb_path: Path, reviewed_path: Path) -> No
     extras = meshes["object_6_session_1"]["extras"]
     assert (extras["id"], extras["session"], extras["label"]) == (6, 1, "moved")
     assert (extras["label_machine"], extras["decided_by"]) == ("appeared", "=Ann")
-    assert "Nothing on the earlier visit matches this object" in extras["evidence"]
+    assert "of its place was in view on the earlier visit" in extras["evidence"]
     assert extras["sigma"] is not None and extras["confidence"] == 0.86
     nodes = {node["name"]: node for node in document["nodes"]}
     assert nodes["object_6_session_1"]["extras"]["label"] == "moved"
