@@ -84,8 +84,9 @@ class Decision:
     move_log_odds: tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
-# Chooses moves among those between two sets of instances (counted from 1) that may have moved.
-FindMoves = Callable[[set[int], set[int]], Sequence[Move]]
+# Chooses moves among those between two sets of instances (counted from 1) that may have moved, but for pairs
+# that stayed.
+FindMoves = Callable[[set[int], set[int], set[tuple[int, int]]], Sequence[Move]]
 
 
 def decide_by_association(
@@ -167,7 +168,11 @@ def decide_by_evidence(
         set(np.flatnonzero((odds > settings.moves.least_change_log_odds) & visit.is_met).tolist()) - {0}
         for odds, visit in zip(log_odds, visits, strict=True)
     ]
-    moves = find_moves(may_move[0], may_move[1])
+    # Two objects at one place that hardly looks changed are one that stayed: what moves a thing only a
+    # little leaves less doubt than an alignment that is a little off.
+    at_one_place = np.argwhere(overlap > change.same_place_overlap) + 1
+    stayed = {(int(p), int(c)) for p, c in at_one_place if min(log_odds[0][p], log_odds[1][c]) <= 0}
+    moves = find_moves(may_move[0], may_move[1], stayed)
     likeliest = [odds.copy() for odds in move_log_odds]
     for move in moves:
         labels[0][move.previous] = labels[1][move.current] = ChangeLabel.MOVED

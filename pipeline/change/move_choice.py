@@ -40,13 +40,14 @@ class MoveChoice:
             for of_visit, instance in zip(self.likeliest, (move.previous, move.current), strict=True):
                 of_visit[instance] = max(of_visit[instance], move.log_odds)
 
-    def __call__(self, previous: set[int], current: set[int]) -> list[Move]:
-        """One-to-one moves between instances (counted from 1) that may have moved."""
+    def __call__(self, previous: set[int], current: set[int], stayed: set[tuple[int, int]]) -> list[Move]:
+        """One-to-one moves between instances (counted from 1) that may have moved; ``stayed`` did not."""
         return choose_moves(
             self._scored,
             lambda move: (
                 move.previous in previous
                 and move.current in current
+                and (move.previous, move.current) not in stayed
                 and self._is_observed(move)
                 and self._has_moved(move)
             ),

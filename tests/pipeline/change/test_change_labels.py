@@ -151,7 +151,11 @@ def by_evidence(before, now, overlap=None, moves=()) -> Decision:
         before,
         now,
         overlap,
-        lambda left, taken: [m for m in moves if m.previous in left and m.current in taken],
+        lambda left, taken, stayed: [
+            m
+            for m in moves
+            if m.previous in left and m.current in taken and (m.previous, m.current) not in stayed
+        ],
         no_moves(before, now),
         SETTINGS,
     )
@@ -222,6 +226,25 @@ def test_doubtful_change_may_move_and_a_sure_stay_may_not() -> None:
     assert not moved_if_possible(visit([0.0], log_odds=[least]), visit([2.0], changed=True))
 
 
+@pytest.mark.parametrize(("log_odds", "overlap", "label"), [(-0.5, 0.2, L.STATIC), (-0.5, 0.05, L.MOVED)])
+def test_what_hardly_looks_changed_at_its_own_place_has_not_moved_a_little(log_odds, overlap, label) -> None:
+    nudged = [move(1, 1, x_m=0.15)]
+
+    doubtful = by_evidence(
+        visit([0.0], log_odds=[log_odds]), visit([0.0], log_odds=[log_odds]), [[overlap]], nudged
+    )
+    clear = by_evidence(visit([0.0], log_odds=[0.5]), visit([0.0], log_odds=[0.5]), [[overlap]], nudged)
+
+    assert (doubtful.labels0[1], doubtful.labels1[1]) == (label, label)
+    assert (clear.labels0[1], clear.labels1[1]) == (L.MOVED, L.MOVED)
+
+
+def test_pair_that_stayed_is_not_chosen() -> None:
+    visits, found = (visit([0.0]), visit([0.0])), move(1, 1)
+
+    assert MoveChoice([found], visits, SETTINGS)({1}, {1}, {(1, 1)}) == []
+
+
 def test_what_was_not_met_did_not_move() -> None:
     assert not moved_if_possible(visit([0.0], changed=True), visit([2.0], changed=True, is_met=False))
 
@@ -231,7 +254,7 @@ def test_one_of_the_two_places_of_a_move_was_observed(left: float, taken: float,
     visits = visit([0.0], coverage=[left]), visit([0.0], coverage=[taken])
     found = move(1, 1)
 
-    assert MoveChoice([found], visits, SETTINGS)({1}, {1}) == ([found] if seen else [])
+    assert MoveChoice([found], visits, SETTINGS)({1}, {1}, set()) == ([found] if seen else [])
 
 
 def test_object_that_moved_is_not_tied_to_what_stands_at_its_place() -> None:
