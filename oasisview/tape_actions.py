@@ -102,7 +102,7 @@ class TapeActions:
 
     def _clicked(self, event: viser.SceneClickEvent) -> None:
         origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
-        found = self._view.point_under(origin, direction)
+        found = self._view.clicks.point_under(origin, direction)
         with self._lock:
             if not self.active:
                 return

@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 
 from oasisview.catalogue import Catalogue
 from oasisview.panels.hud import Layers
-from oasisview.scene import outlines
 from oasisview.scene.cameras import draw_cameras
+from oasisview.scene.clicks import Drawn, MapClicks
 from oasisview.scene.cut import CutBox
 from oasisview.scene.ghost import Ghost
 from oasisview.scene.map_points import GROUND_RGB, MapPoints, Rgb, VisitPoints, muted, object_colours
 from oasisview.scene.marks import Marks
-from oasisview.scene.picking import pick_object
-from oasisview.scene.tape import point_on_ray
 from pipeline.result import ChangeLabel
 
 PAST_LABELS = (ChangeLabel.DISAPPEARED, ChangeLabel.MOVED)
@@ -30,7 +28,8 @@ VisitLabels = tuple[Callable[[int], ChangeLabel | None], Callable[[int], ChangeL
 
 
 class MapView:
-    """The map as one browser shows it; ``marks`` draws selection, boxes and names over it.
+    """The map as one browser shows it; ``marks`` draws selection, boxes and names over it, ``clicks`` says
+    what a click means.
 
     Args:
         client: the tab.
@@ -61,12 +60,11 @@ class MapView:
         self._decided: VisitLabels = (label_of, label_of)
         self._labels: VisitLabels = self._decided
         self._label_rgb = label_rgb
-        self._on_object = on_object
         self._on_keyframe = on_keyframe
         self._mode, self._colours, self._layers, self._dark = "after", "label", Layers(), False
         self._clouds: dict[str, viser.PointCloudHandle] = {}
-        self._picks: dict[int, viser.BatchedMeshHandle] = {}
         self._ghost = Ghost(client.scene, points.point_size_m)
+        self.clicks = MapClicks(client.scene, catalogue, points, self._drawn, on_object)
         self.marks = Marks(client, catalogue, points, self._shown_label, label_rgb)
 
     def build(self, mode: str, colours: str, layers: Layers, *, dark: bool) -> None:
@@ -77,7 +75,7 @@ class MapView:
         self._ground()
         for visit in range(len(self._visits)):
             self._add_clouds(visit)
-            self._add_picks(visit)
+            self.clicks.add_boxes(visit)
             draw_cameras(self._scene, self._catalogue.session(visit), visit, self._points, self._on_keyframe)
         self._add_gone()
         self._draw_marks()
@@ -157,35 +155,15 @@ class MapView:
                 self._add_clouds(visit)
             self._add_gone()
             self._draw_marks()
+            self._ghost.forget()
             self._apply_visibility()
 
-    # Clicks
+    # Nodes
 
-    def point_under(
-        self, origin: NDArray[np.floating], direction: NDArray[np.floating]
-    ) -> NDArray[np.float64] | None:
-        """The drawn point (3,) under a click, world; runs over all points, so off the loop."""
-        drawn = []
-        for visit, points in enumerate(self._visits):
-            if self._whole(visit):
-                drawn.append(points.objects)
-                if self._layers.background:
-                    drawn.append(points.background)
-                    drawn += [points.ceiling] if self._layers.ceiling else []
-            elif self._shows(visit):
-                drawn.append(points.objects[self._past(points.object_ids)])
-        local = np.asarray(origin, np.float64) - self._points.origin
-        cloud = np.concatenate(drawn) if drawn else np.zeros((0, 3), np.float32)
-        size = max(0.01, self._points.point_size_m)
-        for radius_m in (size, 2.5 * size, 6 * size):  # the wider ones for gaps between sparse points
-            found = point_on_ray(local, direction, cloud, radius_m)
-            if found is not None:
-                return np.asarray(found + self._points.origin)
-        return None
-
-    def object_under(self, origin: NDArray[np.floating], direction: NDArray[np.floating]) -> int | None:
-        """The object that a click along a ray (world) means; runs over all drawn points, so off the loop."""
-        objects, ids, background = [], [], []
+    def _drawn(self) -> Drawn:
+        """What is shown now; of the earlier visit beside the later one, only what is past."""
+        nothing = np.zeros((0, 3), np.float32)
+        objects, ids, background, ceiling = [nothing], [np.zeros(0, np.int32)], [nothing], [nothing]
         for visit, points in enumerate(self._visits):
             if not self._shows(visit):
                 continue
@@ -194,54 +172,10 @@ class MapView:
             ids.append(points.object_ids[keep])
             if self._whole(visit) and self._layers.background:
                 background.append(points.background)
-        local = np.asarray(origin, np.float64) - self._points.origin
-        size = self._points.point_size_m
-        found = pick_object(
-            local,
-            np.asarray(direction, np.float64),
-            np.concatenate(objects) if objects else np.zeros((0, 3), np.float32),
-            np.concatenate(ids) if ids else np.zeros(0, np.int32),
-            np.concatenate(background) if background else np.zeros((0, 3), np.float32),
-            radius_m=max(0.03, 1.2 * size),
-            point_size_m=size,
+                ceiling += [points.ceiling] if self._layers.ceiling else []
+        return Drawn(
+            np.concatenate(objects), np.concatenate(ids), np.concatenate(background), np.concatenate(ceiling)
         )
-        return found if found in self._catalogue.objects else None
-
-    def _add_picks(self, visit: int) -> None:
-        """Invisible boxes that catch clicks; which object was meant is decided by the points."""
-        found = [
-            (item.object_id, sighting)
-            for item in self._catalogue.objects.values()
-            if (sighting := item.sighting(visit)) is not None
-        ]
-        if not found:
-            return
-        low = np.array([s.box_min_world_m for _, s in found]) - self._points.origin
-        high = np.array([s.box_max_world_m for _, s in found]) - self._points.origin
-        vertices, faces = outlines.box_mesh()
-        handle = self._scene.add_batched_meshes_simple(
-            f"/map/pick/{visit}",
-            vertices,
-            faces,
-            np.tile(np.array([1.0, 0, 0, 0], np.float32), (len(found), 1)),
-            ((low + high) / 2).astype(np.float32),
-            batched_scales=(1.05 * (high - low) + 0.02).astype(np.float32),
-            opacity=0.0,
-            lod="off",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
-        self._picks[visit] = handle
-
-        @handle.on_click
-        def _(event: viser.SceneNodePointerEvent[viser.BatchedMeshHandle]) -> None:
-            if event.ray_origin is None or event.ray_direction is None:
-                return
-            hit = self.object_under(np.array(event.ray_origin), np.array(event.ray_direction))
-            if hit is not None:
-                self._on_object(hit)
-
-    # Nodes
 
     def _cut_visits(self) -> tuple[VisitPoints, ...]:
         visits, box = self._points.visits, self._box
@@ -343,8 +277,7 @@ class MapView:
                 cloud = self._clouds.get(name)
                 if cloud is not None and cloud.visible != on:
                     cloud.visible = on
-            if visit in self._picks:
-                self._picks[visit].visible = self._clickable and self._shows(visit)
+            self.clicks.show_boxes(visit, self._clickable and self._shows(visit))
             for kind, on in (("keyframes", self._layers.keyframes), ("path", self._layers.path)):
                 for suffix in ("", "_pick"):
                     handle = self._scene.get_handle_by_name(f"/map/{kind}{suffix}/{visit}")
