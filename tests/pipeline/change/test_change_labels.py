@@ -298,7 +298,7 @@ def test_background_is_no_object_whatever_its_evidence(background: tuple[float, 
         before,
         now,
         np.diag([0.8, 0.8]),
-        lambda left, taken: asked.append((left, taken)) or [],
+        lambda left, taken, _: asked.append((left, taken)) or [],
         no_moves(before, now),
         SETTINGS,
     )
