@@ -30,6 +30,7 @@ COUNTS, SHARED, SUBMAPS, MOVES, TRIALS = (170, 175), 120, 27, 250, 100
 
 
 def main() -> None:
+    """Print both rules' times."""
     draw = np.random.default_rng(0)
     if len(sys.argv) > 1:
         again = what_if(open_result(sys.argv[1]))

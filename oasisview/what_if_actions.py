@@ -69,7 +69,9 @@ class WhatIfActions:
                 _log.warning("%s", error)
                 self._page.what_if.show(unavailable_html(str(error)), "")
                 return
-            if self._again is None:
+            # Rules may have changed since: what they say now is then no change of limits.
+            if self._again is None or self._again.under(self._trial.own).flips:
+                self._again = None
                 self._page.what_if.show(unavailable_html(wording.NO_WHAT_IF), "")
                 return
             self._show_controls()

@@ -7,7 +7,7 @@ choice under limits, and this is what it needs.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,9 @@ from pipeline.change.decision import Decision, VisitEvidence, decide_by_associat
 from pipeline.change.evidence import ObjectEvidence
 from pipeline.change.move_choice import MoveChoice
 from pipeline.settings import Settings
+
+# Of an object's evidence, what the rules still look at once its log odds are known.
+_DECIDING = ("voxel_count", "coverage", "centroid_world")
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ class DecisionBasis:
         return decide_by_evidence(*self.visits, self.overlap, choice, choice.likeliest, settings)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Everything but the evidence tables, as named arrays to be stored."""
+        """What decides, as named arrays to be stored."""
         pairs = np.argwhere(self.matches.link_count > 0)
         at = tuple(pairs.T)
         arrays: dict[str, NDArray[Any]] = {
@@ -85,23 +88,20 @@ class DecisionBasis:
             arrays["overlap_pairs"] = places.astype(np.int32)
             arrays["overlap"] = self.overlap[tuple(places.T)]
         for visit, evidence in enumerate(self.visits):
-            arrays[f"voxel_count_{visit}"] = evidence.objects.voxel_count
-            arrays[f"coverage_{visit}"] = evidence.objects.coverage
-            arrays[f"centroid_world_{visit}"] = evidence.objects.centroid_world
+            for name in _DECIDING:
+                arrays[f"{name}_{visit}"] = getattr(evidence.objects, name)
             arrays[f"log_odds_{visit}"] = evidence.log_odds
             arrays[f"is_met_{visit}"] = evidence.is_met
         return arrays
 
     @classmethod
-    def from_arrays(
-        cls, arrays: Mapping[str, NDArray[Any]], tables: tuple[NDArray[np.void], NDArray[np.void]]
-    ) -> DecisionBasis:
-        """Inverse of :meth:`arrays`; ``tables`` is the stored evidence of both visits.
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> DecisionBasis:
+        """Inverse of :meth:`arrays`; evidence that decides nothing any more is NaN.
 
         Raises:
             KeyError, ValueError, IndexError: the arrays are not what :meth:`arrays` gives.
         """
-        visits = (_visit(arrays, 0, tables[0]), _visit(arrays, 1, tables[1]))
+        visits = (_visit(arrays, 0), _visit(arrays, 1))
         shape = (visits[0].count, visits[1].count)
         matches = MatchEvidence(
             _dense(shape, arrays["link_pairs"], arrays["link_count"]),
@@ -126,17 +126,15 @@ class DecisionBasis:
         return cls(visits, matches, proposals, overlap, moves)
 
 
-def _visit(arrays: Mapping[str, NDArray[Any]], visit: int, table: NDArray[np.void]) -> VisitEvidence:
-    objects = replace(
-        ObjectEvidence.from_table(table),
-        voxel_count=np.array(arrays[f"voxel_count_{visit}"]),
-        coverage=np.array(arrays[f"coverage_{visit}"]),
-        centroid_world=np.array(arrays[f"centroid_world_{visit}"]),
-    )
+def _visit(arrays: Mapping[str, NDArray[Any]], visit: int) -> VisitEvidence:
     log_odds = np.array(arrays[f"log_odds_{visit}"])
-    if not len(objects.coverage) == len(log_odds) == len(table) + 1:
-        raise ValueError(f"{len(log_odds) - 1} objects where the evidence of visit {visit} has {len(table)}")
-    return VisitEvidence(objects, log_odds, np.array(arrays[f"is_met_{visit}"]))
+    unknown = np.full(len(log_odds), np.nan)
+    columns = {field.name: unknown for field in fields(ObjectEvidence)}
+    columns |= {name: np.array(arrays[f"{name}_{visit}"]) for name in _DECIDING}
+    is_met = np.array(arrays[f"is_met_{visit}"])
+    if {len(values) for values in (is_met, *columns.values())} != {len(log_odds)}:
+        raise ValueError(f"the evidence of visit {visit} is not of the same objects throughout")
+    return VisitEvidence(ObjectEvidence(**columns), log_odds, is_met)
 
 
 def _dense(shape: tuple[int, int], pairs: NDArray[Any], values: NDArray[Any]) -> NDArray[Any]:

@@ -128,9 +128,8 @@ def what_if(result: Result) -> WhatIf | None:
     arrays = getattr(result, "basis_arrays", None)
     if arrays is None:
         return None
-    tables = tuple(getattr(session, "evidence") for session in result.sessions[:2])  # noqa: B009
     try:
-        basis = DecisionBasis.from_arrays(arrays, (tables[0], tables[1]))
+        basis = DecisionBasis.from_arrays(arrays)
     except (KeyError, ValueError, IndexError) as error:
         raise ResultError(f"basis.npz of {result.path} is damaged ({error})", "run it again") from None
     return WhatIf(result, basis)

@@ -87,8 +87,7 @@ def test_pair_that_becomes_one_is_named(small_result: Result, small_result_path:
     arrays["move_pairs"] = np.concatenate([arrays["move_pairs"], [[row, column]]]).astype(np.int32)
     arrays["move_log_odds"] = np.append(arrays["move_log_odds"], -3.0)
     arrays["move_T_world_motion"] = np.concatenate([arrays["move_T_world_motion"], motion[None]])
-    tables = tuple(session.evidence for session in small_result.sessions)  # type: ignore[attr-defined]
-    again = WhatIf(small_result, DecisionBasis.from_arrays(arrays, tables))
+    again = WhatIf(small_result, DecisionBasis.from_arrays(arrays))
 
     assert again.under(SETTINGS).flips == ()
     flips = {
@@ -114,8 +113,7 @@ def test_result_without_a_basis_says_so_and_a_damaged_one_is_named(small_result_
 
 def test_what_is_stored_is_what_was_given(small_result: Result) -> None:
     arrays = small_result.basis_arrays  # type: ignore[attr-defined]
-    tables = tuple(session.evidence for session in small_result.sessions)  # type: ignore[attr-defined]
-    basis = DecisionBasis.from_arrays(arrays, tables)
+    basis = DecisionBasis.from_arrays(arrays)
 
     again = basis.arrays()
 
