@@ -15,6 +15,8 @@ from pipeline.result import ChangeLabel, MapObject, MatchCase, Result
 _EMPTY, _DIFFERENT = 0.3, 0.35
 # Moves less likely than this are no rivals worth a word.
 _WORTH_A_WORD = 0.02
+# Marks that agree in fewer places may agree by chance.
+_MARKS = 3
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,7 @@ class Rivals:
         match: the object of the other visit that its patches match best, chosen or not; None without any.
         moved_to: another object that it may have become, or been, elsewhere, by laying both over each other;
             None without any.
+        marks: places of the surface whose print or marks agree between where it was and where it is now.
         moved_chance: how likely that is; chosen_chance: of the move that was chosen, if there is one.
     """
 
@@ -32,6 +35,7 @@ class Rivals:
     moved_to: int | None = None
     moved_chance: float = 0.0
     chosen_chance: float | None = None
+    marks: int = 0
 
 
 def rivals_of(result: Result, item: MapObject) -> Rivals:
@@ -48,7 +52,7 @@ def rivals_of(result: Result, item: MapObject) -> Rivals:
     instance = item.counterpart_instance
     match = int(ids[instance]) if instance is not None and 0 <= instance < len(ids) else None
     moves = getattr(machine, "moves", None)
-    best, chosen, other = -math.inf, None, None
+    best, chosen, other, marks = -math.inf, None, None, 0
     for row in moves if moves is not None else ():
         ends = (int(row["previous_object_id"]), int(row["current_object_id"]))
         if item.object_id not in ends:
@@ -56,9 +60,10 @@ def rivals_of(result: Result, item: MapObject) -> Rivals:
         log_odds = float(row["log_odds"])
         if ends[0] == ends[1]:
             chosen = _chance(log_odds)
+            marks = round(math.expm1(float(row["print"]))) if "print" in moves.dtype.names else 0
         elif log_odds > best:
             best, other = log_odds, ends[1] if ends[0] == item.object_id else ends[0]
-    return Rivals(match, other, _chance(best) if other is not None else 0.0, chosen)
+    return Rivals(match, other, _chance(best) if other is not None else 0.0, chosen, marks)
 
 
 def _chance(log_odds: float) -> float:
@@ -118,9 +123,12 @@ def _moved(item: MapObject, limits: Limits, rivals: Rivals) -> str:
     away = "another place" if item.displacement_m is None else f"{length(item.displacement_m)} away"
     if item.T_world_motion is not None:
         links = "patch by patch nothing links the two" if item.sigma <= 0 else _match_words(item)
+        marks = ""
+        if rivals.marks >= _MARKS:
+            marks = f"; marks on its surface agree in {rivals.marks} places"
         return (
             f"Found again {away}: laid over what stands there, its shape, colours and pattern fit "
-            f"({percent(item.confidence)} sure); {links}.{_next_best(rivals)}"
+            f"({percent(item.confidence)} sure){marks}; {links}.{_next_best(rivals)}"
         )
     if item.case is not MatchCase.CONFIDENT:
         return (

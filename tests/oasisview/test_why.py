@@ -56,6 +56,11 @@ CASES = {
         "(66% sure); "
         "patch by patch nothing links the two. Next best: object #122 (22% against 41% for this one).",
     ),
+    "moved, found again by the marks on it": (
+        4, {**UNMATCHED, "T_world_motion": MOTION, "displacement_m": 2.99, "confidence": 0.95}, Rivals(marks=17),
+        "Found again 2.99 m away: laid over what stands there, its shape, colours and pattern fit "
+        "(95% sure); marks on its surface agree in 17 places; patch by patch nothing links the two.",
+    ),
     "moved by matches": (
         4, {**MATCHED, "case": MatchCase.CONFIDENT, "displacement_m": 0.82}, None,
         "Same object, new place: 70% of its patches match, with quality 0.93, but it now stands 82 cm away "
@@ -167,6 +172,21 @@ def test_rivals_are_what_the_result_stores(small_result_path: Path) -> None:
     assert rivals_of(result, result.object(12)).moved_to == 4
     assert rivals_of(result, result.object(8)).match == 7
     assert rivals_of(result, result.object(1)).moved_to is None
+
+
+def test_marks_that_agree_are_counted_from_the_move(small_result_path: Path) -> None:
+    kinds = [
+        ("previous_object_id", "<i4"),
+        ("current_object_id", "<i4"),
+        ("log_odds", "<f4"),
+        ("print", "<f4"),
+    ]
+    rows = [(4, 4, 1.5, np.log1p(16.8)), (4, 12, -1.0, np.log1p(90.0))]
+    write_array(small_result_path / "moves.npy", np.array(rows, kinds))
+
+    result = open_result(small_result_path)
+    assert rivals_of(result, result.object(4)).marks == 17
+    assert rivals_of(result, result.object(12)).marks == 0  # not what became of it
 
 
 def test_what_people_corrected_has_no_rivals_of_the_machine(small_result: Result) -> None:
