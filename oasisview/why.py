@@ -60,7 +60,7 @@ def rivals_of(result: Result, item: MapObject) -> Rivals:
         log_odds = float(row["log_odds"])
         if ends[0] == ends[1]:
             chosen = _chance(log_odds)
-            marks = round(math.expm1(float(row["print"]))) if "print" in moves.dtype.names else 0
+            marks = round(math.expm1(float(row["print"]))) if "print" in row.dtype.names else 0
         elif log_odds > best:
             best, other = log_odds, ends[1] if ends[0] == item.object_id else ends[0]
     return Rivals(match, other, _chance(best) if other is not None else 0.0, chosen, marks)

@@ -57,7 +57,8 @@ CASES = {
         "patch by patch nothing links the two. Next best: object #122 (22% against 41% for this one).",
     ),
     "moved, found again by the marks on it": (
-        4, {**UNMATCHED, "T_world_motion": MOTION, "displacement_m": 2.99, "confidence": 0.95}, Rivals(marks=17),
+        4, {**UNMATCHED, "T_world_motion": MOTION, "displacement_m": 2.99, "confidence": 0.95},
+        Rivals(marks=17),
         "Found again 2.99 m away: laid over what stands there, its shape, colours and pattern fit "
         "(95% sure); marks on its surface agree in 17 places; patch by patch nothing links the two.",
     ),
