@@ -80,7 +80,8 @@ class MapView:
         self._add_gone()
         self._draw_marks()
         self._apply_visibility()
-        self._client.camera.on_update(lambda _: self.marks.arrange_soon())
+        self.clicks.listen()
+        self._client.camera.on_update(self._on_camera)
 
     def close(self) -> None:
         """The tab is gone: nothing more is sent."""
@@ -159,6 +160,10 @@ class MapView:
             self._apply_visibility()
 
     # Nodes
+
+    def _on_camera(self, camera: viser.CameraHandle) -> None:
+        self.marks.arrange_soon()
+        self.clicks.follow_camera(camera.position)
 
     def _drawn(self) -> Drawn:
         """What is shown now; of the earlier visit beside the later one, only what is past."""
