@@ -68,6 +68,15 @@ def event_words(event: Event, machine: MachineMap, target: Event | None = None) 
             return f"{parts(machine, event.groups[0].members)} are pieces of one object: {new}"
 
 
+def cause_words(event: Event, machine: MachineMap) -> str:
+    """What made an object other than the machine found it."""
+    if event.kind in (Kind.LABEL, Kind.ACCEPT):
+        # The correction that it was based on was taken back; the label still says what is one object.
+        named = parts(machine, event.groups[0].members) if event.groups else f"#{event.object_id}"
+        return f"{named} decided upon as one object"
+    return event_words(event, machine)
+
+
 def opinion_words(opinion: Opinion, machine: MachineMap, *, alone: bool) -> str:
     """What one person says; ``alone`` = all voices mean the same object, so its label is enough."""
     if not opinion.is_object:

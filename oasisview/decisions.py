@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from oasisview.correction_words import disagreement_words, event_words
+from oasisview.correction_words import cause_words, disagreement_words
 from oasisview.review import (
     CorrectedMap,
     CorrectedObject,
@@ -267,5 +267,5 @@ def _verdict(entry: CorrectedObject, machine: MachineMap) -> Verdict:
         who=final.decided_by or "",
         at=final.decided_at or "",
         reason=final.why or "",
-        correction="" if entry.cause is None else event_words(entry.cause, machine),
+        correction="" if entry.cause is None else cause_words(entry.cause, machine),
     )

@@ -9,7 +9,7 @@ from oasisview.correction_words import event_words
 from oasisview.page import Page
 from oasisview.queue_actions import SelectObject
 from oasisview.queue_filter import next_to_review
-from oasisview.review import CORRECTIONS, ConflictError, Decision, Kind
+from oasisview.review import CORRECTIONS, ConflictError, CorrectedMap, Decision, Kind
 from oasisview.shell import Shell
 from oasisview.wording import LABEL_NAMES
 from oasisview.workbench import Workbench
@@ -75,11 +75,13 @@ class VerdictActions:
 
     def undo(self) -> None:
         """Take back this person's latest decision."""
-        self._turn(self._decisions.undo(self._shell.user), "Undone", "Nothing to undo.")
+        before = self._decisions.corrected
+        self._turn(self._decisions.undo(self._shell.user), before, "Undone", "Nothing to undo.")
 
     def redo(self) -> None:
         """Restore what was taken back last."""
-        self._turn(self._decisions.redo(self._shell.user), "Redone", "Nothing to redo.")
+        before = self._decisions.corrected
+        self._turn(self._decisions.redo(self._shell.user), before, "Redone", "Nothing to redo.")
 
     def note(self, text: str) -> None:
         """Write something down about the selected object."""
@@ -93,18 +95,21 @@ class VerdictActions:
         chosen = self._choices.selected
         return self._catalogue.objects.get(chosen) if chosen is not None else None
 
-    def _turn(self, decision: Decision | None, done: str, nothing: str) -> None:
+    def _turn(self, decision: Decision | None, before: CorrectedMap, done: str, nothing: str) -> None:
         if decision is None:
             self._shell.toast(nothing)
             return
         state = self._decisions.corrected
         object_id = state.present_id(decision.object_id)
+        same = decision.kind is not Kind.NOTE and state.objects == before.objects
+        rest = " What others decided since still counts." if same else ""
         if decision.kind in (*CORRECTIONS, Kind.RESTORE):
             event = self._decisions.history()[decision.event_id - 1]
-            self._shell.toast(f"{done}: {event_words(event, state.machine)}.")
+            self._shell.toast(f"{done}: {event_words(event, state.machine)}.{rest}")
         else:
             label = LABEL_NAMES[self._decisions.label_of(object_id or 0)]
-            self._shell.toast(f"{done}: {wording.object_name(object_id or decision.object_id)} is {label}.")
+            name = wording.object_name(object_id or decision.object_id)
+            self._shell.toast(f"{done}: {name} is {label}.{rest}")
         if object_id is not None:
             self._select(object_id, fly=object_id != self._choices.selected)
 

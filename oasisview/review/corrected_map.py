@@ -2,7 +2,8 @@
 
 A pure function of the machine's map and the standing decisions in their order. A correction takes the
 fragments that it names out of whatever they were in and makes its groups of them, so any sequence of
-decisions gives a partition of all fragments, and without decisions the machine's.
+decisions gives a partition of all fragments, and without decisions the machine's. A label does the same for
+the object that it was given to.
 """
 
 from __future__ import annotations
@@ -118,23 +119,35 @@ class _Builder:
 
     def regroup(self, event: Event) -> None:
         for group in event.groups:
-            known = {fragment for fragment in group.members if fragment in self.class_of}
-            if not known:  # of a result that was computed again, and has fewer objects
-                continue
-            made = _Class(known, group.is_object, event)
-            for fragment in known:
-                torn = self.class_of[fragment]
-                torn.members.discard(fragment)
-                torn.cause = event
-                self.class_of[fragment] = made
+            self._gather(group.members, event, is_object=group.is_object)
             if group.label is not None:
-                self.said[frozenset(known)] = (event, group.label)
+                self.said[self._known(group.members)] = (event, group.label)
 
     def label(self, event: Event) -> None:
+        """A label says as well that what it was given to is one object.
+
+        So it keeps its object where a correction below it is taken back, or restored, by somebody else.
+        """
         machine_members = self.machine.members.get(event.object_id, frozenset())
-        members = event.groups[0].members if event.groups else machine_members
+        members = self._known(event.groups[0].members if event.groups else machine_members)
         if members:
+            present = self.class_of[min(members)]
+            if present.members != members or not present.is_object:
+                self._gather(members, event, is_object=True)
             self.said[members] = (event, event.new_label)
+
+    def _known(self, members: Members) -> Members:
+        """Without those of a result that was computed again, and has fewer objects."""
+        return members.intersection(self.class_of)
+
+    def _gather(self, members: Members, event: Event, *, is_object: bool) -> None:
+        known = self._known(members)
+        made = _Class(set(known), is_object, event)
+        for fragment in known:
+            torn = self.class_of[fragment]
+            torn.members.discard(fragment)
+            torn.cause = event
+            self.class_of[fragment] = made
 
 
 def corrected_map(machine: MachineMap, standing: Iterable[Event]) -> CorrectedMap:

@@ -4,8 +4,9 @@ Undo with several inspectors: a person takes back their own decisions only, late
 were about; a new decision of theirs ends what they could redo. The final label of an object is the
 latest decision about it that is not undone, whoever made it: undoing an older decision under somebody
 else's newer one changes nothing until that one is undone too, and a redone decision returns to its old
-place in the order instead of overruling what others decided meanwhile. Corrections obey the same rules
-(``oasisview.review.corrected_map`` says what follows from those that stand).
+place in the order instead of overruling what others decided meanwhile. Corrections obey the same rules, and a
+label keeps the object that it was given to (``oasisview.review.corrected_map`` says what follows from the
+decisions that stand).
 
 Restoring an earlier state is a decision like any other: it makes exactly those decisions stand that stood
 then, and undoing it brings back what it took away and takes away what it brought back.

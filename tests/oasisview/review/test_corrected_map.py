@@ -165,8 +165,11 @@ def test_labels_belong_to_exactly_what_they_were_given_to(machine: MachineMap) -
     assert (
         corrected_map(machine, events[:2]).objects[6].final.label is APPEARED
     )  # the pair was never labelled
-    apart = corrected_map(machine, [events[0], events[2]])  # without the merge, the older label counts again
-    assert apart.objects[6].final.label is STATIC and apart.objects[12].final.decided_by is None
+    kept = corrected_map(machine, [events[0], events[2]])  # Ben took his merge back; Cem's label needs it
+    assert kept.objects[6].members == both.members and kept.objects[6].final.label is MOVED
+    assert kept.objects[6].cause == events[2] and 12 not in kept.objects
+    alone = corrected_map(machine, [events[1], label(3, 12, STATIC)])  # as if Ben's merge was redone below it
+    assert alone.objects[12].final.label is STATIC and alone.objects[6].members == members("6.1")
 
 
 def test_an_overridden_label_pairs_and_unpairs_replaced_events(machine: MachineMap) -> None:

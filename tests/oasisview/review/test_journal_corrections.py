@@ -86,6 +86,23 @@ def test_a_label_of_a_corrected_object_names_its_parts(journal: Journal) -> None
     assert journal.decide(12, ChangeLabel.STATIC, who="ann").groups == ()
 
 
+def test_taking_a_correction_back_does_not_silence_what_others_decided_on_it(journal: Journal) -> None:
+    write(journal, corrections.merge(journal.corrected(), (6, 12)))
+    journal.decide(6, ChangeLabel.MOVED, who="ben")
+    before = journal.corrected().objects[6]
+    journal.undo("ann")
+    after = journal.corrected().objects[6]
+    assert (after.members, after.final) == (before.members, before.final)
+    journal.undo("ben")
+    assert not journal.corrected().is_corrected
+    journal.redo("ann")
+    write(journal, corrections.split_visits(journal.corrected(), 4), who="ben")
+    journal.undo("ben")
+    journal.decide(4, ChangeLabel.STATIC, who="ann")
+    journal.redo("ben")  # back below Ann's label, which is about the whole of 4
+    assert journal.final_labels()[4].label is ChangeLabel.STATIC and 16 not in journal.final_labels()
+
+
 def test_every_object_concerned_is_checked_for_conflicts(journal: Journal) -> None:
     seen = journal.last_event_id
     merged = corrections.merge(journal.corrected(), (6, 12))
