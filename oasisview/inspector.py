@@ -166,6 +166,7 @@ class Inspector:
                 self._choose_keyframe(item)
             self._page.show_evidence()
             self._shell.set_selection(item.object_id)
+            self._bench.look_at(self.client_id, item.object_id)
             self._show_band()
             self._map.marks.select(item)
             if fly:

@@ -115,6 +115,7 @@ class Page:
         """Whose page this is, and who else is looking."""
         others = self._bench.others(self._client.client_id)
         self._shell.set_html("who", who_html(self._shell.user, others, self._bench.name))
+        self._shell.set_cursors([(name, number) for name, number in others if number is not None])
 
     def show_queue(self) -> None:
         """The list of objects."""

@@ -25,7 +25,7 @@ from __future__ import annotations
 import dataclasses
 import html
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib import resources
 from typing import Any, Literal, TypeVar, get_args
@@ -240,6 +240,10 @@ class Shell:
         one. Closing it sends nothing.
         """
         self._call("confirm", title, text, list(buttons.items()))
+
+    def set_cursors(self, others: Sequence[tuple[str, int]]) -> None:
+        """Mark the rows of ``[data-object="ID"]`` that other people look at with their initials."""
+        self._call("setCursors", [list(other) for other in others])
 
     def set_picking(self, text: str) -> None:
         """Show what to click next until the text is empty again; Esc sends ``end_pick``."""

@@ -31,6 +31,7 @@ class Workbench:
         self.views = SavedViews(result.path)
         self.name = result.path.stem
         self._present: dict[int, str] = {}
+        self._looked_at: dict[int, int] = {}
         self._watchers: list[Callable[[], None]] = []
         self._lock = threading.Lock()
 
@@ -45,14 +46,30 @@ class Workbench:
         """Somebody closed a page."""
         with self._lock:
             self._present.pop(client_id, None)
+            self._looked_at.pop(client_id, None)
             if watcher in self._watchers:
                 self._watchers.remove(watcher)
         self._tell()
 
-    def others(self, client_id: int) -> list[str]:
-        """Who else is looking, by name; one entry per page."""
+    def look_at(self, client_id: int, object_id: int) -> None:
+        """Somebody selected an object; everyone else sees where they are."""
         with self._lock:
-            return sorted(name for client, name in self._present.items() if client != client_id)
+            if client_id not in self._present or self._looked_at.get(client_id) == object_id:
+                return
+            self._looked_at[client_id] = object_id
+        self._tell()
+
+    def others(self, client_id: int) -> list[tuple[str, int | None]]:
+        """Who else is looking, by name, and at which object; one entry per page."""
+        with self._lock:
+            present = [
+                (name, self._looked_at.get(client))
+                for client, name in self._present.items()
+                if client != client_id
+            ]
+        state = self.decisions.corrected
+        found = [(name, None if number is None else state.present_id(number)) for name, number in present]
+        return sorted(found, key=lambda other: (other[0], other[1] or 0))
 
     def close(self) -> None:
         """Let go of the files."""

@@ -98,6 +98,11 @@
     else return;
     event.preventDefault();
   }, true);
+  // What was chosen lets go of the focus as well: it would swallow the keys of all commands.
+  document.addEventListener("change", (event) => {
+    const field = event.target;
+    if (field instanceof Element && field.matches(".oa-filters select, .oa-filters input[type=checkbox]")) field.blur();
+  });
   // What was clicked with the pointer lets go of the focus, so that Enter accepts and does not click it again.
   document.addEventListener("click", (event) => {
     const clicked = event.target instanceof Element && event.target.closest(".oa [data-send], .oa [data-object]");
@@ -113,5 +118,19 @@
     });
   });
 
-  Object.assign(oasis, { confirm, setPicking });
+  /* ---- where others are ---- */
+
+  const cursorStyle = oasis.element("oa-cursors", "style", document.head);
+  const setCursors = (others) => {
+    const initials = new Map();
+    for (const [name, objectId] of others) {
+      const first = [...name].find((letter) => /[\p{L}\p{N}]/u.test(letter)) || "?";
+      initials.set(objectId, (initials.get(objectId) || "") + first.toUpperCase());
+    }
+    // Rules, not elements: the list is drawn anew without them.
+    cursorStyle.textContent = [...initials].map(([objectId, letters]) =>
+      `.oa-row[data-object="${Number(objectId)}"]::after{content:"${letters}"}`).join("\n");
+  };
+
+  Object.assign(oasis, { confirm, setPicking, setCursors });
 })

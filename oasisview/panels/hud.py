@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 from oasisview.panels.markup import chip, key, sends
@@ -100,7 +100,16 @@ def legend_html(colours: str, mode: str) -> str:
     return f'<div class="oa oa-legend">{items}</div>'
 
 
-def who_html(user: str, others: list[str], name: str) -> str:
-    """Whose page this is, and who else is looking."""
-    rest = f" \u00b7 also here: {escape(', '.join(others))}" if others else ""
+def who_html(user: str, others: Sequence[tuple[str, int | None]], name: str) -> str:
+    """Whose page this is, and who else is looking, at which object."""
+    rest = ""
+    if others:
+        rest = f'<div class="oa-others">also here: {", ".join(_other(*other) for other in others)}</div>'
     return f'<div class="oa oa-who"><b>{escape(name)}</b> \u00b7 {escape(user)}{rest}</div>'
+
+
+def _other(name: str, object_id: int | None) -> str:
+    if object_id is None:
+        return escape(name)
+    tip = f'title="Look at what {escape(name)} looks at"'
+    return f'{escape(name)} <button class="oa-at" {sends("select", object_id)} {tip}>#{object_id}</button>'

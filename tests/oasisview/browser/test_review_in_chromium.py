@@ -323,6 +323,34 @@ def test_what_somebody_else_did_meanwhile_is_a_conflict_and_disagreement_is_mark
     made = corrections.merge(decisions.corrected, (4, 6))
     decisions.correct(made, who="ben", reason="", seen_event_id=None)
     page.wait_for_selector('[data-evidence="4"]')
+    page.keyboard.press("u")
+    toast(view, "What others decided since still counts.")
+    assert added()[-1].kind is Kind.UNDO and decisions.corrected.objects[4].machine_ids == (4, 6, 12)
+
+
+def test_where_others_are_is_shown_and_can_be_looked_at(app, view) -> None:
+    page, bench = view.page, app.workbench
+
+    def watch() -> None:
+        """Ben's page needs no telling here."""
+
+    bench.enter(-1, "ben", watch)
+    try:
+        bench.look_at(-1, 12)
+        chip = page.locator("#oa-who button", has_text="#12")
+        expect(chip).to_have_count(1, timeout=PATIENCE_MS)
+        mark = (
+            "() => getComputedStyle(document.querySelector('.oa-row[data-object=\"12\"]'), '::after').content"
+        )
+        assert page.evaluate(mark) == '"B"'
+        chip.click()
+        page.wait_for_selector('[data-evidence="12"]')
+        assert [number for _, number in bench.others(-1)] == [12]
+        bench.look_at(-1, 7)
+        expect(page.locator("#oa-who button", has_text="#7")).to_have_count(1, timeout=PATIENCE_MS)
+    finally:
+        bench.leave(-1, watch)
+    expect(page.locator("#oa-who button")).to_have_count(0, timeout=PATIENCE_MS)
 
 
 def test_searching_by_number_selects_and_typing_decides_nothing(app, view, added) -> None:

@@ -134,7 +134,7 @@ def test_what_people_wrote_is_escaped(catalogue: Catalogue) -> None:
                   ChangeLabel.STATIC, NASTY, None)  # fmt: skip
     checked(journal_html([event], MachineMap.of_labels({})))
     checked(export_html(1, 3, NASTY))
-    checked(who_html(NASTY, [NASTY], NASTY))
+    checked(who_html(NASTY, [(NASTY, None), (NASTY, 12)], NASTY))
     checked(progress_html(JobState(warnings=(NASTY,), error=NASTY), [NASTY], 3.0))
 
 
