@@ -10,6 +10,7 @@ import pytest
 import oasisview.export.exporter as exporter_module
 import oasisview.export.heatmaps as heatmaps_module
 import oasisview.export.ply_points as ply_module
+from oasisview.cli import main
 from oasisview.commands import export as command
 from oasisview.export import FORMATS, export
 from pipeline.errors import InputError, ResultError, StorageError
@@ -129,3 +130,16 @@ def test_a_place_without_objects_is_exported_too(objectless_path: Path, tmp_path
         "heatmaps": b"folder",
     }
     assert expected.get(format, b"") in content
+
+
+def test_the_command_tells_how_far_it_is_and_names_the_file(
+    small_result_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "map.laz"
+    assert main(["export", str(small_result_path), "--format", "laz", "-o", str(out)]) == 0
+    said = capsys.readouterr()
+    assert said.out == f"{out}\n"
+    assert said.err.splitlines()[-1] == "Writing the export: 2/2"
+    assert main(["export", "--help"]) == 0
+    listed = capsys.readouterr().out
+    assert all(f"  {name} " in listed for name in FORMATS)
