@@ -19,7 +19,7 @@ from oasisview.what_if_limits import LIMITS, RULES, Trial
 from oasisview.workbench import Workbench
 from pipeline.association.cases import match_case
 from pipeline.change.relabel import Relabelled, WhatIf, what_if
-from pipeline.errors import OasisError
+from pipeline.errors import InputError, OasisError
 from pipeline.result import ChangeLabel
 from pipeline.settings import Settings
 
@@ -65,6 +65,10 @@ class WhatIfActions:
             try:
                 self._again = what_if(self._bench.result)
                 self._trial = Trial.of(Settings.from_dict(self._bench.result.manifest.get("settings", {})))
+            except InputError as error:  # settings that this version does not know
+                _log.info("no what-if: %s", error)
+                self._page.what_if.show(unavailable_html(wording.NO_WHAT_IF), "")
+                return
             except OasisError as error:
                 _log.warning("%s", error)
                 self._page.what_if.show(unavailable_html(str(error)), "")
