@@ -167,10 +167,11 @@ def object_colours(
     label_rgb: Mapping[ChangeLabel, Rgb],
     *,
     dark: bool,
+    pale: NDArray[np.uint8] | None = None,
 ) -> NDArray[np.uint8]:
     """Colours of object points, (N, 3), for the mode ``label``, ``identity`` or ``true``.
 
-    What has no label is painted like background.
+    What has no label is painted like background. ``pale`` is ``muted`` of the colours, if known already.
     """
     if mode == "true" or len(object_ids) == 0:
         return colours_rgb
@@ -192,6 +193,6 @@ def object_colours(
         if label is ChangeLabel.STATIC:
             strength[row] = 0.5
     index = np.searchsorted(known, object_ids)
-    base = muted(colours_rgb, dark=dark).astype(np.float32)
+    base = (muted(colours_rgb, dark=dark) if pale is None else pale).astype(np.float32)
     mixed = base * (1 - strength[index]) + paint[index] * strength[index]
     return np.round(mixed).astype(np.uint8)

@@ -63,6 +63,7 @@ class MapView:
         self._on_keyframe = on_keyframe
         self._mode, self._colours, self._layers, self._dark = "after", "label", Layers(), False
         self._clouds: dict[str, viser.PointCloudHandle] = {}
+        self._pale: list[tuple[NDArray[np.uint8], bool, NDArray[np.uint8]]] = []
         self._ghost = Ghost(client.scene, points.point_size_m)
         self.clicks = MapClicks(client.scene, catalogue, points, self._drawn, on_object)
         self.marks = Marks(client, catalogue, points, self._shown_label, label_rgb)
@@ -132,11 +133,12 @@ class MapView:
     def recolour(self) -> None:
         """Follow changed labels: objects, their boxes, and what is shown of the earlier visit."""
         with self._client.atomic():
-            for visit in range(len(self._points.visits)):
+            colours = [self._object_colours(visit) for visit in range(len(self._visits))]
+            for visit, of_visit in enumerate(colours):
                 cloud = self._clouds.get(f"{visit}/objects")
                 if cloud is not None:
-                    cloud.colors = self._object_colours(visit)
-            self._add_gone()
+                    cloud.colors = of_visit
+            self._add_gone(colours[0])
             self._draw_marks()
             self._ghost.forget()
             self._apply_visibility()
@@ -232,9 +234,19 @@ class MapView:
             self._labels[visit],
             self._label_rgb[self._dark],
             dark=self._dark,
+            pale=self._pale_of(points),
         )
 
-    def _add_gone(self) -> None:
+    def _pale_of(self, points: VisitPoints) -> NDArray[np.uint8]:
+        """``muted`` colours of a visit's objects; labels change far more often than they do."""
+        for colours, dark, pale in self._pale:
+            if colours is points.objects_rgb and dark == self._dark:
+                return pale
+        pale = muted(points.objects_rgb, dark=self._dark)
+        self._pale = [*self._pale[-1:], (points.objects_rgb, self._dark, pale)]
+        return pale
+
+    def _add_gone(self, colours: NDArray[np.uint8] | None = None) -> None:
         """What Both adds to the later map: the earlier visit's points of what is gone or moved."""
         points = self._visits[0]
         keep = self._past(points.object_ids)
@@ -244,7 +256,7 @@ class MapView:
             self._clouds["0/gone"] = self._scene.add_point_cloud(
                 "/map/0/gone",
                 points.objects[keep],
-                self._object_colours(0)[keep],
+                (self._object_colours(0) if colours is None else colours)[keep],
                 point_size=self._points.point_size_m,
                 point_shape="diamond",
                 point_shading="flat",
