@@ -17,7 +17,9 @@ from oasisview.app import RunningApp, start
 from oasisview.inspector import Inspector
 from oasisview.patch_links import story_of
 from oasisview.scene.map_points import LABEL_RGB
+from oasisview.what_if_limits import LIMIT_OF_KEY
 from pipeline.result import ChangeLabel
+from pipeline.settings import Settings
 
 PATIENCE_MS = 30_000
 WINDOW = (1366, 768)
@@ -120,7 +122,8 @@ def test_moves_need_the_chance_that_the_slider_asks_for(app, view) -> None:
     expect(page.locator(".oa-what-if").nth(1)).to_contain_text(
         "These are the limits of this result", timeout=PATIENCE_MS
     )
-    expect(page.locator('[data-send="what_if_move"]')).to_have_value("31", timeout=PATIENCE_MS)
+    own = str(LIMIT_OF_KEY["move"].step_of(Settings()))
+    expect(page.locator('[data-send="what_if_move"]')).to_have_value(own, timeout=PATIENCE_MS)
 
 
 def test_applying_is_one_journal_entry_with_the_limits_as_reason_and_one_undo_takes_it_back(
