@@ -24,6 +24,8 @@ PURPLE_ORANGE_DARK: tuple[str, ...] = (
     *("#6b3a10", "#b5661a", "#ec9a3c", "#ffd39a"),
 )
 
+# Scores of matches crowd near 1: colours start where no match would be believed.
+LOWEST_LINK_SCORE = 0.5
 # Depth differences beyond this are drawn in the last colour.
 GEOMETRIC_RANGE_M = 0.3
 
@@ -60,6 +62,11 @@ def share_colour(value: float) -> tuple[str, str]:
     red, green, blue = (int(c) for c in _SEMANTIC[round(255 * float(np.clip(np.nan_to_num(value), 0, 1)))])
     luminance = 0.299 * red + 0.587 * green + 0.114 * blue
     return f"#{red:02x}{green:02x}{blue:02x}", "#101216" if luminance > 120 else "#ffffff"
+
+
+def link_colour(score: float) -> str:
+    """Colour (CSS) of a patch match: dark where no match would be believed, bright where it is sure."""
+    return share_colour((score - LOWEST_LINK_SCORE) / (1 - LOWEST_LINK_SCORE))[0]
 
 
 def colour_semantic(heatmap: NDArray[np.floating], height: int, width: int) -> NDArray[np.uint8]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from oasisview import wording
 from oasisview.catalogue import Catalogue
+from oasisview.heatmap_colours import link_colour
 from oasisview.object_views import BeforeAfter, ObjectView
 from oasisview.panels.markup import key, picture, sends
 from oasisview.shell import escape
@@ -99,10 +100,12 @@ def _lines(views: BeforeAfter) -> str:
         x1, y1 = line.before[0] * CROP_WIDTH, line.before[1] * 100
         x2, y2 = CROP_WIDTH + GAP_WIDTH + line.after[0] * CROP_WIDTH, line.after[1] * 100
         kind = "oa-link" if line.lands_on_object else "oa-link oa-astray"
-        drawn.append(f'<line class="{kind}" x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}"/>')
+        ends = f'x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}"'
+        drawn.append(f'<line class="oa-link-ground" {ends}/>')
+        drawn.append(f'<line class="{kind}" style="--s:{link_colour(line.score)}" {ends}/>')
     return (
         '<svg class="oa-links" viewBox="0 0 100 100" preserveAspectRatio="none" role="img" '
-        f'aria-label="{len(drawn)} patch matches">{"".join(drawn)}</svg>'
+        f'aria-label="{len(views.lines)} patch matches">{"".join(drawn)}</svg>'
     )
 
 

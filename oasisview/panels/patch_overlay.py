@@ -9,13 +9,10 @@ from dataclasses import dataclass
 
 from oasisview import wording
 from oasisview.catalogue import Catalogue
-from oasisview.heatmap_colours import share_colour
+from oasisview.heatmap_colours import link_colour
 from oasisview.panels.markup import sends
 from oasisview.patch_links import DrawnLink, PatchPick, PatchStory, links_of_object, story_of
 from oasisview.shell import escape
-
-# Scores of matches crowd near 1: colours start where no match would be believed.
-_LOWEST = 0.5
 
 
 @dataclass(frozen=True)
@@ -117,7 +114,7 @@ def patch_words(story: PatchStory, tau_s: float) -> str:
 def _mark(number: int, link: DrawnLink, session: int, tau_s: float) -> str:
     x, y = (link.before, link.after)[session]
     end = ("from", "to")[session]
-    colour, _ = share_colour((link.score - _LOWEST) / (1 - _LOWEST))
+    colour = link_colour(link.score)
     dashed = "" if link.score >= tau_s else " oa-weak"
     words = f"{wording.LINK_ROLES[link.role]}, quality {link.score:.2f}"
     # A line of no length with round ends is a dot that the stretched view box leaves round.
