@@ -160,13 +160,19 @@ def _one_sided(item: MapObject, limits: Limits, rivals: Rivals, *, appeared: boo
     if rivals.moved_to is not None and rivals.moved_chance >= _WORTH_A_WORD:
         text += (
             f" Laid over other objects, it fits {object_name(rivals.moved_to)} best "
-            f"({percent(rivals.moved_chance)} likely the same; {percent(limits.move_chance)} needed)."
+            f"({percent(rivals.moved_chance)} likely the same{_not_taken(rivals, limits)})."
         )
     if item.replaces is not None:
         text += f" It stands where {object_name(item.replaces)} was."
     if item.replaced_by is not None:
         text += f" {object_name(item.replaced_by).capitalize()} stands there now."
     return text
+
+
+def _not_taken(rivals: Rivals, limits: Limits) -> str:
+    if rivals.moved_chance <= limits.move_chance:
+        return f"; {percent(limits.move_chance)} needed"
+    return ", but it would hardly have moved, or others fit better"
 
 
 def _unmatched(item: MapObject, limits: Limits, rivals: Rivals) -> str:
