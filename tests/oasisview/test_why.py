@@ -86,8 +86,8 @@ CASES = {
     "disappeared, with a likely rival that was not taken": (
         9, {**UNMATCHED, "coverage": 1.0, "seen_through": 0.9}, Rivals(None, 71, 0.61),
         "100% of its place was in view on the later visit, 90% of that was empty by then, and nothing "
-        "matched it. Laid over other objects, it fits object #71 best (61% likely the same, but it would hardly have "
-        "moved, or others fit better).",
+        "matched it. Laid over other objects, it fits object #71 best (61% likely the same, but it "
+        "would hardly have moved, or others fit better).",
     ),
     "appeared where something looked other, in the place of another": (
         7, {"sigma": 0.2, "s_bar": 0.9, "coverage": 1.0, "seen_through": 0.02, "appearance_change": 0.59},
