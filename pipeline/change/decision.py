@@ -171,7 +171,11 @@ def decide_by_evidence(
     # Two objects at one place that hardly looks changed are one that stayed: what moves a thing only a
     # little leaves less doubt than an alignment that is a little off.
     at_one_place = np.argwhere(overlap > change.same_place_overlap) + 1
-    stayed = {(int(p), int(c)) for p, c in at_one_place if min(log_odds[0][p], log_odds[1][c]) <= 0}
+    stayed = {
+        (int(p), int(c))
+        for p, c in at_one_place
+        if min(log_odds[0][p], log_odds[1][c]) <= change.min_log_odds
+    }
     moves = find_moves(may_move[0], may_move[1], stayed)
     likeliest = [odds.copy() for odds in move_log_odds]
     for move in moves:
