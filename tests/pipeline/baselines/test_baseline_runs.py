@@ -92,7 +92,8 @@ def test_result_can_be_evaluated_and_exported(
 
 @pytest.mark.parametrize("method", BASELINES)
 def test_viewer_says_who_decided(method: str, result_of: Callable[[str], Result]) -> None:
-    from oasisview.wording import Limits, why
+    from oasisview.why import why
+    from oasisview.wording import Limits
 
     result = result_of(method)
     assert f"The baseline {method} says so" in why(result.objects[0], Limits.of(result))
