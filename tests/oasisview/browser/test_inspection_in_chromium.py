@@ -195,12 +195,17 @@ def centre_of_object(view: ViewerPage, result, app: RunningApp, object_id: int) 
     rows, columns = np.nonzero(mask)
     middle = np.argmin((rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2)
     u, v = (columns[middle] + 0.5) / mask.shape[1], (rows[middle] + 0.5) / mask.shape[0]
-    tile = view.page.locator('[data-part="this"] .oa-pic').bounding_box()
-    frame = view.page.locator('[data-part="this"] .oa-frame').bounding_box()
-    return {
-        "x": frame["x"] - tile["x"] + u * frame["width"],
-        "y": frame["y"] - tile["y"] + v * frame["height"],
-    }
+    # Read at once: the band may be drawn anew between two questions.
+    frame = view.page.wait_for_function(
+        """() => {
+            const tile = document.querySelector('[data-part="this"] .oa-pic')?.getBoundingClientRect();
+            const frame = document.querySelector('[data-part="this"] .oa-frame')?.getBoundingClientRect();
+            return tile && frame && frame.width > 0
+                ? {x: frame.x - tile.x, y: frame.y - tile.y, width: frame.width, height: frame.height}
+                : null;
+        }"""
+    ).json_value()
+    return {"x": frame["x"] + u * frame["width"], "y": frame["y"] + v * frame["height"]}
 
 
 def test_an_override_is_on_disk_recolours_every_page_and_survives_undo_and_reload(
