@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.association.object_keypoints import ObjectKeypoints, no_keypoints
+from pipeline.association.object_registration import best_motions
 from pipeline.camera import rotation_angle_rad, transform_points
 
 _LEAST_SIMILARITY = 0.8
@@ -226,7 +227,7 @@ class _Pairs:
         return min(sums)
 
     def _fitted(self, agrees: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """(4, 4) least-squares motion of the pairs' points and axes (Horn, 1987)."""
+        """(4, 4) least-squares motion of the pairs' points and axes."""
         arm_m = 2 * _REACH_SPACINGS * self.spacing_m
         before, after = (
             np.concatenate([points, points + arm_m * axes[:, :, 0], points + arm_m * axes[:, :, 2]])
@@ -236,14 +237,9 @@ class _Pairs:
             )
         )
         weight = np.outer([1, _AXES_WEIGHT, _AXES_WEIGHT], self.weight[agrees] + 1e-3).ravel()
-        weight /= weight.sum()
-        centre0, centre1 = weight @ before, weight @ after
-        U, _, Vt = np.linalg.svd(((before - centre0) * weight[:, None]).T @ (after - centre1))
-        V = Vt.T
-        V[:, 2] *= np.sign(np.linalg.det(V @ U.T))
+        rotations, translations = best_motions(before[None], after[None], weight[None], None)
         T = np.eye(4)
-        T[:3, :3] = V @ U.T
-        T[:3, 3] = centre1 - T[:3, :3] @ centre0
+        T[:3, :3], T[:3, 3] = rotations[0], translations[0]
         return T
 
 

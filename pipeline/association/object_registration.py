@@ -118,7 +118,7 @@ class _Target:
         moved = points @ rotations.transpose(0, 2, 1) + translations[:, None]
         nearest, distance = self._nearest(moved, cloud)
         weights = 1.0 / (1.0 + (distance / _REACH_SPACINGS) ** 2) ** 2  # Geman-McClure
-        turn, shift = _best_motions(moved, self._points[nearest], weights, up)
+        turn, shift = best_motions(moved, self._points[nearest], weights, up)
         return turn @ rotations, (turn @ translations[..., None])[..., 0] + shift, distance.mean(axis=1)
 
     def cost(
@@ -167,7 +167,7 @@ def rotation_about(axis: NDArray[np.floating], angle_rad: float) -> NDArray[np.f
     return np.eye(3) + np.sin(angle_rad) * cross + (1 - np.cos(angle_rad)) * cross @ cross
 
 
-def _best_motions(
+def best_motions(
     moved: NDArray[np.float64],
     target: NDArray[np.float64],
     weights: NDArray[np.float64],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +14,11 @@ from pipeline.association.keypoint_registration import (
     print_places,
     register_by_keypoints,
 )
-from pipeline.association.object_keypoints import no_keypoints, object_keypoints
+from pipeline.association.object_keypoints import ObjectKeypoints, no_keypoints, object_keypoints
 from pipeline.correspondence.compare import VisitImages
 from pipeline.settings import Settings
+
+_IMAGES_KEPT = 24
 
 
 @dataclass(frozen=True)
@@ -64,17 +67,19 @@ def find_prints(previous: VisitImages, current: VisitImages, spacing_m: float, s
     Args:
         spacing_m: distance of neighbouring points of the objects' clouds.
     """
-    keypoints = [
-        [no_keypoints()]
-        + [
-            object_keypoints(visit.geometry, visit.objects, visit.image, instance)
-            for instance in range(1, visit.objects.count + 1)
-        ]
-        for visit in (previous, current)
-    ]
+    keypoints = [_keypoints_of(visit) for visit in (previous, current)]
     registrations = register_by_keypoints(keypoints[0], keypoints[1], spacing_m)
     limits = (settings.change.tau_d_m, settings.moves.min_rotation_deg)
     is_still = {pair: found.is_still(*limits) for pair, found in registrations.items()}
     places = [[print_places(of_object, spacing_m) for of_object in of_visit] for of_visit in keypoints]
     counts = (previous.objects.count, current.objects.count)
     return Prints(registrations, is_still, counts, (places[0], places[1]))
+
+
+def _keypoints_of(visit: VisitImages) -> list[ObjectKeypoints]:
+    """By instance, background first."""
+    # Neighbouring objects are seen by the same keyframes: each image is decoded once for all of them.
+    image = lru_cache(_IMAGES_KEPT)(visit.image)
+    instances = range(1, visit.objects.count + 1)
+    found = [object_keypoints(visit.geometry, visit.objects, image, instance) for instance in instances]
+    return [no_keypoints(), *found]
